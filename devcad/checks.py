@@ -1,0 +1,109 @@
+"""A check: one proven statement about a part, with its value, its limit and its place."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from devcad.errors import CheckFailed
+
+CHECKS = {
+    "twist": "the tangent plane stays the same along every ruling",
+    "regular": "the surface ends before its regression curve",
+    "isometry": "lengths in the pattern are lengths on the surface",
+    "mesh-deviation": "the mesh lies within the tolerance",
+    "fold-back": "the pattern and its bends rebuild the surface",
+    "overlap": "the pattern does not overlap itself",
+    "bend-radius": "the material takes the smallest radius",
+    "step-deviation": "the STEP file is the surface",
+    "step-twist": "the faces in the STEP file are developable",
+    "volume": "the STEP solid has the volume of the sheet",
+    "dxf-deviation": "the curves in the DXF file are the pattern's",
+}
+"""Every check by name, with what it proves; design.md section 7 has the limits."""
+
+
+@dataclass(frozen=True, slots=True)
+class Where:
+    """The place where a check takes its worst value; what does not apply is None."""
+
+    t: float | None = None
+    v: float | None = None
+    point: tuple[float, float, float] | None = None
+    flat: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    """``value`` against ``limit`` in ``unit``; ``passed`` says whether the statement holds.
+
+    ``says`` is the statement of a failure, its value and place included; ``remedy`` what to do.
+    """
+
+    name: str
+    panel: str
+    value: float
+    limit: float
+    unit: str
+    passed: bool
+    where: Where = Where()
+    says: str = ""
+    remedy: str = ""
+
+    def failure(self) -> CheckFailed:
+        """The error that a failed check raises."""
+        what = self.says or f"{self.value:.6g} {self.unit}"
+        return CheckFailed(
+            f"{self.name}: {what}, limit {self.limit:.6g} {self.unit}".rstrip(),
+            panel=self.panel,
+            value=self.value,
+            limit=self.limit,
+            remedy=self.remedy,
+        )
+
+
+def require(checks: Iterable[Check], allow: frozenset[str]) -> None:
+    """Raise the first check that failed and is not in ``allow``.
+
+    Raises:
+        CheckFailed: with the check's panel, value, limit and remedy.
+    """
+    for check in checks:
+        if not check.passed and check.name not in allow:
+            raise check.failure()
+
+
+def at_most(
+    name: str,
+    panel: str,
+    value: float,
+    limit: float,
+    unit: str,
+    *,
+    where: Where | None = None,
+    says: str = "",
+    remedy: str = "",
+) -> Check:
+    """A check that holds when ``value`` does not exceed ``limit`` (and is a number)."""
+    return Check(
+        name, panel, value, limit, unit, bool(value <= limit), where or Where(), says, remedy
+    )
+
+
+NAMES = (
+    "twist",
+    "regular",
+    "isometry",
+    "mesh-deviation",
+    "fold-back",
+    "overlap",
+    "bend-radius",
+    "step-deviation",
+    "step-twist",
+    "step-valid",
+    "dxf-deviation",
+    "dxf-readback",
+    "stl-readback",
+    "volume",
+)
+"""Every check there is: what --allow accepts."""

@@ -1,0 +1,363 @@
+"""The command line: arguments, exit codes, printing. No geometry.
+
+Only typer and the error tree are imported here; each command loads what it needs, so that help
+and usage errors answer at once.
+"""
+
+from __future__ import annotations
+
+import json
+import signal
+import sys
+import threading
+import warnings
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn
+
+import typer
+
+from devcad import __version__, console
+from devcad.errors import DevcadError, JobError
+
+if TYPE_CHECKING:
+    from devcad.job.load import Job
+    from devcad.pipeline import Progress
+
+INTERRUPTED = 130  # 128 + SIGINT, as shells have it
+
+app = typer.Typer(
+    name="devcad",
+    help="From a job file that describes a developable surface to STEP, STL, glTF, DXF and SVG.",
+    add_completion=False,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+    epilog="""\b
+Examples:
+  devcad new frustum > lamp.toml
+  devcad check lamp.toml
+  devcad export lamp.toml
+  devcad export *.toml --pipeline sheet-metal -o parts
+\b
+Exit codes: 0 done, 2 job file or usage, 3 geometry or a failed check,
+4 limits, 5 files, 70 a bug of ours.""",
+)
+
+Jobs = Annotated[list[str], typer.Argument(metavar="JOB", help="Job files.")]
+Pipeline = Annotated[
+    str | None, typer.Option(metavar="NAME", help="Recipe; devcad list pipelines names them.")
+]
+Allow = Annotated[
+    list[str] | None,
+    typer.Option(metavar="CHECK", help="Let a failed check pass; the report says so."),
+]
+AsJson = Annotated[bool, typer.Option("--json", help="Print one array of reports.")]
+
+
+@app.callback(invoke_without_command=True)
+def _devcad(
+    context: typer.Context,
+    version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
+) -> None:
+    if version:
+        console.say(f"devcad {__version__}")
+        raise typer.Exit
+    if context.invoked_subcommand is None:
+        raise JobError("there is no command", remedy="devcad --help names them")
+
+
+@app.command(
+    epilog="""\b
+Examples:
+  devcad export samples/lampshade.toml
+  devcad export samples/hopper.toml --to step,dxf -o parts
+  devcad export *.toml --pipeline sheet-metal --json"""
+)
+def export(
+    jobs: Jobs,
+    pipeline: Pipeline = None,
+    to: Annotated[
+        str, typer.Option(metavar="FORMATS", help="step,stl,glb,dxf,svg instead of the recipe's.")
+    ] = "",
+    out: Annotated[str, typer.Option("-o", "--out", metavar="OUT", help="Folder.")] = "out",
+    allow: Allow = None,
+    as_json: AsJson = False,
+) -> int:
+    """Write OUT/<job>/ with the files of the recipe and report.json."""
+    formats, allowed = _formats(to), _checks(allow)
+
+    def work(job: Job, progress: Progress) -> dict[str, Any]:
+        from devcad import pipeline as spine
+
+        recipe = spine.plan(job, pipeline=pipeline, formats=formats, allow=allowed)
+        part = spine.build(job, pipeline=pipeline, allow=allowed, progress=progress)
+        return spine.export(
+            part,
+            out,
+            formats=recipe.formats,
+            options=recipe.options,
+            allow=recipe.allow,
+            progress=progress,
+        )
+
+    def lines(report: dict[str, Any]) -> Iterable[str]:
+        from devcad.report.text import file_lines
+
+        return file_lines(report, out)
+
+    return _each(jobs, work, as_json, lines)
+
+
+@app.command(
+    epilog="""\b
+Examples:
+  devcad check samples/lampshade.toml
+  devcad check *.toml --json"""
+)
+def check(
+    jobs: Jobs, pipeline: Pipeline = None, allow: Allow = None, as_json: AsJson = False
+) -> int:
+    """Build and check the geometry; write nothing."""
+    allowed = _checks(allow)
+
+    def work(job: Job, progress: Progress) -> dict[str, Any]:
+        from devcad.pipeline import build
+        from devcad.report import make_report
+
+        part = build(job, pipeline=pipeline, allow=allowed, progress=progress)
+        return make_report(part, checks=part.checks)
+
+    def lines(report: dict[str, Any]) -> Iterable[str]:
+        from devcad.report.text import check_lines
+
+        return check_lines(report)
+
+    return _each(jobs, work, as_json, lines)
+
+
+@app.command(
+    "list",
+    epilog="""\b
+Examples:
+  devcad list surfaces
+  devcad list pipelines""",
+)
+def list_(
+    what: Annotated[
+        str, typer.Argument(metavar="surfaces|curves|formats|pipelines|materials", help="Which.")
+    ],
+) -> int:
+    """Name the kinds, formats, recipes and materials there are."""
+    from devcad.report.lists import LISTS
+
+    if what not in LISTS:
+        _usage(f'there is no list "{what}"', what, LISTS)
+    rows = LISTS[what]()
+    width = max((len(name) for name in rows), default=0)
+    for name, text in rows.items():
+        console.say(f"{name:{width}}  {text}".rstrip())
+    return 0
+
+
+@app.command(
+    epilog="""\b
+Example:
+  devcad schema > devcad.schema.json"""
+)
+def schema() -> int:
+    """Print the JSON Schema of the job file, for editors."""
+    from devcad.job.schema import job_schema
+
+    console.say(json.dumps(job_schema(), indent=2))
+    return 0
+
+
+@app.command(
+    epilog="""\b
+Example:
+  devcad new frustum > lamp.toml"""
+)
+def new(
+    kind: Annotated[str, typer.Argument(metavar="KIND", help="A kind of surface.")],
+) -> int:
+    """Print a commented job file to start from."""
+    from devcad.job.templates import TEMPLATES, template
+
+    if kind not in TEMPLATES:
+        _usage(f'there is no surface kind "{kind}"', kind, TEMPLATES)
+    console.say(template(kind).rstrip("\n"))
+    return 0
+
+
+def run(arguments: Sequence[str]) -> int:
+    """Run the command line and return its exit code; nothing is raised but SystemExit."""
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGTERM, _terminated)
+    for stream in (sys.stdout, sys.stderr):
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="backslashreplace")
+    try:
+        code = _guarded(arguments)
+        sys.stdout.flush()
+    except BrokenPipeError:
+        console.close_stdout()
+        code = 0
+    return code
+
+
+def _guarded(arguments: Sequence[str]) -> int:
+    """The exit code of a command, every error told in its one line."""
+    try:
+        with warnings.catch_warnings():
+            if not console.debugging():  # a failure's stderr holds its error lines and nothing else
+                warnings.simplefilter("ignore")
+            result = typer.main.get_command(app).main(
+                list(arguments), prog_name="devcad", standalone_mode=False
+            )
+        return result if isinstance(result, int) else 0
+    except (KeyboardInterrupt, typer.Abort):
+        return INTERRUPTED
+    except BrokenPipeError:
+        raise
+    except Exception as error:
+        format_message = getattr(error, "format_message", None)  # one of typer's usage errors
+        if format_message is not None:
+            error = JobError(_one_sentence(format_message()), remedy="see devcad --help")
+        failure = console.failure(error)
+        console.tell(failure)
+        return failure.code
+
+
+def _terminated(*_: object) -> NoReturn:
+    """Leave through the finally clauses, so that no staging folder stays."""
+    raise SystemExit(128 + signal.SIGTERM)
+
+
+def _one_sentence(message: str) -> str:
+    """A usage message as what our error lines begin with."""
+    message = message.strip().removesuffix(".")
+    return f"usage: {message[:1].lower()}{message[1:]}"
+
+
+# --- jobs ----------------------------------------------------------------------------------
+
+
+@dataclass
+class _Outcome:
+    """What became of one job file of the command line."""
+
+    path: str
+    job: Job | None = None
+    report: dict[str, Any] | None = None
+    errors: list[DevcadError] = field(default_factory=list)
+
+    @property
+    def code(self) -> int:
+        return max((error.code for error in self.errors), default=0)
+
+    def entry(self) -> dict[str, Any]:
+        """The report, or what went wrong."""
+        if self.report is not None:
+            return self.report
+        return console.entry(self.errors[0], self.job.name if self.job else self.path)
+
+
+def _each(
+    paths: Sequence[str],
+    work: Callable[[Job, Progress], dict[str, Any]],
+    as_json: bool,
+    lines: Callable[[dict[str, Any]], Iterable[str]],
+) -> int:
+    """Load every job, then work on each; the exit code is the largest."""
+    outcomes = [_loaded(path) for path in paths]
+    twins = _refuse_twins(outcomes)
+    for outcome in outcomes:
+        if outcome.job is not None and not outcome.errors and not twins:
+            _work_on(outcome, outcome.job, work)
+        for error in outcome.errors:
+            console.tell(error)
+        if outcome.report is not None and not as_json:
+            for line in lines(outcome.report):
+                console.say(line)
+    if as_json:
+        done = [outcome.entry() for outcome in outcomes if outcome.report or outcome.errors]
+        console.say(json.dumps(done, indent=2, ensure_ascii=False, allow_nan=False))
+    return max(outcome.code for outcome in outcomes)
+
+
+def _loaded(path: str) -> _Outcome:
+    """The job of a path, or why there is none."""
+    outcome = _Outcome(path)
+    try:
+        from devcad.job.load import load
+
+        outcome.job = load(path)
+    except Exception as error:
+        outcome.errors = console.failures(error, path)
+    return outcome
+
+
+def _refuse_twins(outcomes: Sequence[_Outcome]) -> bool:
+    """Give every job whose name is taken an error; case-blind, as some file systems are."""
+    first: dict[str, str] = {}
+    for outcome in outcomes:
+        if outcome.job is None:
+            continue
+        name = outcome.job.name
+        if name.lower() not in first:
+            first[name.lower()] = outcome.path
+        else:
+            outcome.errors.append(
+                JobError(
+                    f'the name "{name}" is taken by {first[name.lower()]}; nothing was done',
+                    place=f"{outcome.path} > name",
+                    value=name,
+                    limit="one job of each name",
+                    remedy="rename one of the two, or run them one by one",
+                )
+            )
+    return any(outcome.job and outcome.errors for outcome in outcomes)
+
+
+def _work_on(outcome: _Outcome, job: Job, work: Callable[[Job, Progress], dict[str, Any]]) -> None:
+    from devcad.report.progress import ProgressLine
+
+    with ProgressLine() as progress:
+        try:
+            outcome.report = work(job, progress.show)
+        except Exception as error:
+            outcome.errors = console.failures(error, outcome.path)
+
+
+# --- usage ---------------------------------------------------------------------------------
+
+
+def _formats(text: str) -> list[str]:
+    """The formats of --to."""
+    from devcad.export import FORMATS
+
+    names = [name.strip() for name in text.split(",")] if text else []
+    for name in names:
+        if name not in FORMATS:
+            _usage(f'this version knows no format "{name}"', name, FORMATS)
+    return names
+
+
+def _checks(allow: Sequence[str] | None) -> list[str]:
+    """The checks of --allow, given one by one or with commas."""
+    from devcad.checks import CHECKS
+
+    names = [name.strip() for text in allow or () for name in text.split(",")]
+    for name in names:
+        if name not in CHECKS:
+            _usage(f'this version knows no check "{name}"', name, CHECKS)
+    return names
+
+
+def _usage(what: str, word: str, known: Iterable[str]) -> NoReturn:
+    """The error of a word on the command line that is not among the known ones."""
+    from devcad.job.invalid import did_you_mean
+
+    names = list(known)
+    raise JobError(what, value=word, limit=", ".join(names), remedy=did_you_mean(word, names))

@@ -1,0 +1,401 @@
+"""The long edges of a strip: lines and circles where they are ones, else fitted splines."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from devcad.export._step_body import Arc, Cone, Curve, Cylinder, Line, Point, Straight, Trace
+from devcad.export._step_strips import Strip, smooth_courses
+from devcad.geometry.fit import FLOOR, Course, Demand, Ends, Fit, fit
+from devcad.geometry.taylor import Array
+
+EDGE_TOLERANCE = 2e-7  # mm: an edge on an exact face; above 1e-6 kernels call it loose
+THICKNESS_SHARE = 5e-6  # of the thickness; the volume has to hold within 1e-5
+PER_SPAN = (np.arange(5) + 0.5) / 5.0  # places in a span where the written file is measured
+
+
+@dataclass(frozen=True, slots=True)
+class Piece:
+    """A smooth piece of one long edge of a strip, on every layer.
+
+    ``t`` = its two parameters, ``corners`` (2, layers, 3) its ends; for each layer a curve, its
+    span and its trace on the skin; ``probes``: parameters (k,), true points (k, layers, 3) and
+    whether the curve is fitted.
+    """
+
+    t: tuple[float, float]
+    corners: Array
+    curves: tuple[Curve, ...]
+    spans: tuple[tuple[float, float], ...]
+    traces: tuple[Trace | None, ...]
+    probes: tuple[Array, Array]
+
+
+@dataclass(frozen=True, slots=True)
+class Chart:
+    """Angle about the axis and height along the ruling on a circular cylinder or cone.
+
+    ``side`` is +1 where the front is outside. The angle counts from ``x`` so that it is never
+    negative on the strip, ``turn`` = +-1 as it grows or falls with t.
+    """
+
+    strip: Strip
+    axis: Array
+    x: Array
+    side: float
+    turn: float
+    t: Array
+    u: Array
+
+    def angle(self, t: Array) -> Array:
+        """The angle u at t, (n,)."""
+        radial = self.radial(t)
+        raw = np.arctan2(radial @ np.cross(self.axis, self.x), radial @ self.x)
+        near = np.interp(t, self.t, self.u)
+        return np.asarray(raw + 2.0 * np.pi * np.round((near - raw) / (2.0 * np.pi)))
+
+    def radial(self, t: Array) -> Array:
+        """The unit direction away from the axis at t, (n, 3)."""
+        return _radial(self.strip, self.axis, self.side, t)
+
+    def surface(self, layer: int, reach: Array) -> Cylinder | Cone:
+        """The skin of a layer; a cone's circle of reference goes through the widest of the points
+        ``reach`` (k, 3) of that layer."""
+        shape, d = self.strip.shape, self.strip.layers[layer]
+        assert shape.point is not None
+        if shape.radius is not None:
+            return Cylinder(shape.point, self.axis, self.x, shape.radius + self.side * d)
+        assert shape.half_angle is not None
+        sine, cosine = np.sin(shape.half_angle), np.cos(shape.half_angle)
+        apex = shape.point - self.side * d / sine * self.axis
+        slant = float(np.linalg.norm(reach - apex, axis=1).max())
+        return Cone(
+            apex + slant * cosine * self.axis, self.axis, self.x, slant * sine, shape.half_angle
+        )
+
+
+def chart(strip: Strip) -> Chart:
+    """The chart of a strip on a circular cylinder or cone."""
+    shape = strip.shape
+    assert shape.axis is not None and shape.point is not None
+    axis = shape.axis / np.linalg.norm(shape.axis)
+    t = np.linspace(*strip.ends, 257)
+    rails = strip.rails(t[128:129])[0].mean(axis=1)
+    arm = rails.mean(axis=0) - shape.point
+    normal = strip.patch.frame(t[128:129]).n[0]
+    side = 1.0 if normal @ (arm - (arm @ axis) * axis) > 0.0 else -1.0
+    radial = _radial(strip, axis, side, t)
+    y = np.cross(axis, radial[0])
+    u = np.unwrap(np.arctan2(radial @ y, radial @ radial[0]))
+    if u[-1] > 0.0:
+        return Chart(strip, axis, radial[0], side, 1.0, t, u)
+    return Chart(strip, axis, radial[-1], side, -1.0, t, u - u[-1])
+
+
+def heights(surface: Cylinder | Cone, points: Array) -> Array:
+    """The coordinate v of points (n, 3) on the surface, (n,)."""
+    if isinstance(surface, Cylinder):
+        return np.asarray((points - surface.point) @ surface.axis)
+    slant = surface.radius / np.sin(surface.half_angle)
+    apex = surface.point - slant * np.cos(surface.half_angle) * surface.axis
+    return np.asarray(np.linalg.norm(points - apex, axis=1) - slant)
+
+
+def fitted_rails(
+    strip: Strip, corners: Array, tolerance: float, degree: int
+) -> tuple[Fit, Array, Array]:
+    """All edges of a fitted strip as one fit; ``corners`` (2 ends, 2 sides, layers, 3).
+
+    Returns the fit, its probe parameters (k,) and the true points there (k, 2, layers, 3).
+    """
+    layers = len(strip.layers)
+    blocks = tuple(slice(3 * k, 3 * k + 3) for k in range(2 * layers))
+    faces = tuple((blocks[k], blocks[layers + k]) for k in range(layers))
+    t, s = strip.course.t, strip.course.s
+    speeds = np.diff(t)[[0, -1]] / np.diff(s)[[0, -1]]
+    slopes = strip.slopes(strip.ends).reshape(2, -1) * speeds[:, None]
+    for side in np.nonzero(strip.tips)[0]:
+        if layers == 1:
+            slopes[:, blocks[side]] = 0.0
+    held = (slopes[0], slopes[1]) if np.isfinite(slopes).all() else None
+    ends = Ends((corners[0].ravel(), corners[1].ravel()), held)
+    result = fit(
+        lambda x: strip.rails(x).reshape(len(x), -1),
+        strip.course,
+        ends,
+        Demand(degree, tolerance, blocks, faces, *_thickness(strip, blocks)),
+    )
+    probe = _probe_places(result)
+    return result, probe, strip.rails(strip.course(probe))
+
+
+def _thickness(
+    strip: Strip, blocks: tuple[slice, ...]
+) -> tuple[tuple[tuple[slice, slice], ...], float]:
+    """The pairs of skins to keep apart and how closely: volume follows thickness."""
+    if len(strip.layers) == 1:
+        return (), np.inf
+    gap = THICKNESS_SHARE * (strip.layers[1] - strip.layers[0])
+    return ((blocks[0], blocks[1]), (blocks[2], blocks[3])), gap
+
+
+def analytic_pieces(
+    strip: Strip,
+    side: int,
+    corners: Array,
+    lifts: Array,
+    skins: list[Cylinder | Cone] | None,
+    frame: Chart | None,
+    size: float,
+    tolerance: float,
+    degree: int,
+) -> list[Piece]:
+    """One long edge of a plane, cylinder or cone as pieces.
+
+    ``corners`` (2 ends, layers, 3); ``lifts`` (2 ends, 3) is the mitre's part of the skin's
+    offset per unit of thickness, 0 without a crease; ``skins`` and ``frame`` belong to cylinders
+    and cones.
+    """
+    edge = _Edge(strip, side, corners, lifts, skins, frame, size, tolerance, degree)
+    return edge.pieces()
+
+
+@dataclass(frozen=True, slots=True)
+class _Edge:
+    strip: Strip
+    side: int
+    corners: Array
+    lifts: Array
+    skins: list[Cylinder | Cone] | None
+    chart: Chart | None
+    size: float
+    tolerance: float
+    degree: int
+
+    def pieces(self) -> list[Piece]:
+        """The pieces in the order of t."""
+        ends = self.strip.ends
+        if self.strip.tips[self.side]:
+            return [self._point(ends)]
+        out: list[Piece] = []
+        for kind, borders in self._runs():
+            if kind == "line":
+                out.append(self._line(borders[[0, -1]]))
+            elif kind == "arc":
+                out.append(self._arc(borders[[0, -1]]))
+            else:
+                courses = smooth_courses(self._slopes, borders, borders[[0, -1]])
+                out += [self._free(course) for course in courses]
+        return out
+
+    def points(self, t: Array) -> Array:
+        """The edge on every layer, (n, layers, 3)."""
+        return np.asarray(self.strip.rails(t)[:, self.side])
+
+    def _slopes(self, t: Array) -> Array:
+        return self.strip.slopes(t)[:, self.side].reshape(len(t), -1)
+
+    def _runs(self) -> list[tuple[str, Array]]:
+        """Neighbouring stretches between breaks that are one line, one arc, or neither."""
+        borders = self.strip.course.t
+        runs: list[tuple[str, Array]] = []
+        for a, b in zip(borders[:-1], borders[1:], strict=True):
+            kind = self._kind(np.array([a, b]))
+            if runs and runs[-1][0] == kind:
+                joined = np.append(runs[-1][1], b)
+                if kind == "free" or self._kind(joined) == kind:
+                    runs[-1] = (kind, joined)
+                    continue
+            runs.append((kind, np.array([a, b])))
+        return runs
+
+    def _kind(self, borders: Array) -> str:
+        """What the middle edge is between the first and last of the borders."""
+        steps = np.linspace(0.0, 1.0, 13)
+        t = np.unique(
+            np.concatenate([a + (b - a) * steps for a, b in zip(borders[:-1], borders[1:], strict=True)])
+        )
+        layers = self.points(t)
+        if self.skins is not None:
+            level = np.ptp(heights(self.skins[0], layers[:, 0]))
+            return "arc" if level <= FLOOR * self.size else "free"
+        points = layers.mean(axis=1)
+        chord = points[-1] - points[0]
+        length = float(np.linalg.norm(chord))
+        if length > 0.0:
+            off = np.linalg.norm(np.cross(points - points[0], chord / length), axis=1)
+            if off.max() <= FLOOR * self.size:
+                return "line"
+        ends = self.strip.ends
+        bent = [(t[0] == ends[0]) and self.lifts[0].any(), (t[-1] == ends[1]) and self.lifts[1].any()]
+        centre = None if any(bent) else circle_centre(points, self.size)
+        return "free" if centre is None else "arc"
+
+    def _ends(self, t: Array) -> Array:
+        """The corners of a piece over t (2,): the strip's own at its ends, (2, layers, 3)."""
+        out = self.points(t)
+        for k in (0, 1):
+            if t[k] == self.strip.ends[k]:
+                out[k] = self.corners[k]
+        return out
+
+    def _point(self, t: Array) -> Piece:
+        """The edge drawn together in the apex."""
+        layers = len(self.strip.layers)
+        corners = self._ends(t)
+        if self.chart is None or self.skins is None:
+            none = (None,) * layers
+            span = ((0.0, 0.0),) * layers
+            return Piece(_two(t), corners, (Point(),) * layers, span, none, self._no_probes())
+        u = self.chart.angle(t)
+        traces = tuple(
+            Straight(np.array([u[0], heights(skin, corners[:1, k])[0]]), _along(self.chart.turn))
+            for k, skin in enumerate(self.skins)
+        )
+        span = ((0.0, float(abs(u[1] - u[0]))),) * layers
+        return Piece(_two(t), corners, (Point(),) * layers, span, traces, self._no_probes())
+
+    def _line(self, t: Array) -> Piece:
+        corners = self._ends(t)
+        spans = tuple((0.0, float(np.linalg.norm(x[1] - x[0]))) for x in corners.swapaxes(0, 1))
+        none = (None,) * len(spans)
+        return Piece(_two(t), corners, (Line(),) * len(spans), spans, none, self._no_probes())
+
+    def _arc(self, t: Array) -> Piece:
+        """A circular arc: about the axis of a cylinder or cone, or anywhere in a plane."""
+        corners = self._ends(t)
+        samples = np.linspace(t[0], t[1], 33)
+        probes = (np.zeros(0), self.points(samples))
+        if self.chart is None or self.skins is None:
+            arcs = [_plane_arc(x, self.size) for x in probes[1].swapaxes(0, 1)]
+            spans = tuple(_sweep(a, x) for a, x in zip(arcs, probes[1].swapaxes(0, 1), strict=True))
+            return Piece(_two(t), corners, tuple(arcs), spans, (None,) * len(arcs), probes)
+        u = self.chart.angle(t)
+        start, turn = self.chart.radial(t[:1])[0], self.chart.turn
+        curves, traces = [], []
+        for k, skin in enumerate(self.skins):
+            height = (probes[1][:, k] - skin.point) @ skin.axis
+            arm = probes[1][:, k] - skin.point - height[:, None] * skin.axis
+            centre = skin.point + height.mean() * skin.axis
+            radius = float(np.linalg.norm(arm, axis=1).mean())
+            curves.append(Arc(centre, turn * skin.axis, start, radius))
+            v = heights(skin, (centre + radius * start)[None])[0]
+            traces.append(Straight(np.array([u[0], v]), _along(turn)))
+        spans = ((0.0, float(abs(u[1] - u[0]))),) * len(curves)
+        return Piece(_two(t), corners, tuple(curves), spans, tuple(traces), probes)
+
+    def _free(self, course: Course) -> Piece:
+        """A fitted edge: all layers and their traces on the skins in one fit."""
+        t = course.t[[0, -1]]
+        corners = self._ends(t)
+        scale = self._angle_scale()
+        rows = self._rows(t, corners, scale)
+        layers = len(self.strip.layers)
+        width = 3 if self.skins is None else 5
+        spaces = [slice(width * k, width * k + 3) for k in range(layers)]
+        places = [slice(width * k + 3, width * k + 5) for k in range(layers) if width == 5]
+        result = fit(
+            lambda x: self._rows(x, self._lifted(x, t), scale),
+            course,
+            Ends((rows[0], rows[1])),
+            Demand(self.degree, self.tolerance, (*spaces, *places)),
+        )
+        traces = []
+        for b in places:
+            trace = result.spline.part(b)
+            traces.append(type(trace)(trace.degree, trace.knots, trace.poles / [scale, 1.0]))
+        probe = _probe_places(result)
+        x = course(probe)
+        span = (float(course.s[0]), float(course.s[-1]))
+        return Piece(
+            _two(t),
+            corners,
+            tuple(result.spline.part(b) for b in spaces),
+            (span,) * layers,
+            tuple(traces) or (None,) * layers,
+            (probe, self._lifted(x, t)),
+        )
+
+    def _lifted(self, t: Array, ends: Array) -> Array:
+        """The edge on every layer, drawn to the mitred corners over the whole piece."""
+        out = self.points(t)
+        share = (t - ends[0]) / (ends[1] - ends[0])
+        d = np.array(self.strip.layers)[:, None]
+        if ends[0] == self.strip.ends[0]:
+            out += (1.0 - share)[:, None, None] * d * self.lifts[0]
+        if ends[1] == self.strip.ends[1]:
+            out += share[:, None, None] * d * self.lifts[1]
+        return out
+
+    def _rows(self, t: Array, points: Array, scale: float) -> Array:
+        """Points and, on cylinders and cones, places (u in mm of arc) side by side, (n, k)."""
+        if self.chart is None or self.skins is None:
+            return points.reshape(len(t), -1)
+        u = scale * self.chart.angle(t)
+        columns = []
+        for k, skin in enumerate(self.skins):
+            v = heights(skin, points[:, k])
+            columns += [points[:, k], u[:, None], v[:, None]]
+        return np.concatenate(columns, axis=1)
+
+    def _angle_scale(self) -> float:
+        return 1.0 if self.skins is None else max(skin.radius for skin in self.skins)
+
+    def _no_probes(self) -> tuple[Array, Array]:
+        return np.zeros(0), np.zeros((0, len(self.strip.layers), 3))
+
+
+def circle_centre(points: Array, size: float) -> Array | None:
+    """The centre of the circle through all points (n, 3), or None if there is none within
+    1e-9 of the size."""
+    n = len(points)
+    a, b = points[n // 3] - points[0], points[2 * n // 3] - points[0]
+    normal = np.cross(a, b)
+    area = float(normal @ normal)
+    if area <= (FLOOR * size) ** 2 * float(b @ b):
+        return None
+    centre = points[0] + np.cross((a @ a) * b - (b @ b) * a, normal) / (2.0 * area)
+    distance = np.linalg.norm(points - centre, axis=1)
+    level = (points - centre) @ normal / np.sqrt(area)
+    fits = np.ptp(distance) <= FLOOR * size and np.ptp(level) <= FLOOR * size
+    return centre if fits else None
+
+
+def _plane_arc(points: Array, size: float) -> Arc:
+    """The arc through points (n, 3) in their order."""
+    centre = circle_centre(points, size)
+    assert centre is not None
+    arms = points - centre
+    radius = float(np.linalg.norm(arms, axis=1).mean())
+    axis = np.cross(arms[:-1], arms[1:]).sum(axis=0)
+    x = arms[0] / np.linalg.norm(arms[0])
+    axis -= (axis @ x) * x
+    return Arc(centre, axis / np.linalg.norm(axis), x, radius)
+
+
+def _sweep(arc: Arc, points: Array) -> tuple[float, float]:
+    """The span of an arc that runs through the points (n, 3)."""
+    arms = points - arc.centre
+    u = np.unwrap(np.arctan2(arms @ np.cross(arc.axis, arc.x), arms @ arc.x))
+    return 0.0, float(u[-1] - u[0])
+
+
+def _radial(strip: Strip, axis: Array, side: float, t: Array) -> Array:
+    n = side * strip.patch.frame(t).n
+    out = n - (n @ axis)[:, None] * axis
+    return np.asarray(out / np.linalg.norm(out, axis=1)[:, None])
+
+
+def _probe_places(result: Fit) -> Array:
+    knots = np.unique(result.spline.knots)
+    return np.asarray((knots[:-1, None] + np.diff(knots)[:, None] * PER_SPAN).ravel())
+
+
+def _along(turn: float) -> Array:
+    return np.array([turn, 0.0])
+
+
+def _two(t: Array) -> tuple[float, float]:
+    return float(t[0]), float(t[1])

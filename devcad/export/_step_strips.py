@@ -1,0 +1,231 @@
+"""A panel cut into strips, one for each face, and the edges of its layers at any parameter.
+
+A sheet body has one layer, the surface itself; a solid has two, its skins at -T/2 and +T/2.
+Stations are the rulings where strips begin and end. Sides: 0 = from, 1 = to.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from devcad.errors import GeometryError
+from devcad.geometry import taylor
+from devcad.geometry.classify import Shape
+from devcad.geometry.fit import FLOOR, Course
+from devcad.geometry.patch import Patch
+from devcad.geometry.taylor import Array
+from devcad.part import Panel
+
+FITTED_PARTS = 4  # general-purpose area and volume rules need closed surfaces in quarters
+ANALYTIC_PARTS = 2  # no seam edge, no face of a whole turn
+SMOOTH_SPEED = 1e-7  # relative jump of the derivative that a C1 spline may smooth over
+SAMPLES = 257
+
+
+@dataclass(frozen=True, slots=True)
+class Strip:
+    """The part of a patch that becomes one face (and its walls), over ``course`` in t.
+
+    ``first`` and ``last`` are its stations; ``tips`` tells for each side whether the middle
+    surface ends there in one point, the apex.
+    """
+
+    patch: Patch
+    shape: Shape
+    layers: tuple[float, ...]
+    course: Course
+    first: int
+    last: int
+    tips: tuple[bool, bool]
+
+    @property
+    def ends(self) -> Array:
+        """The parameters of the first and the last ruling, (2,)."""
+        return self.course.t[[0, -1]]
+
+    @property
+    def ruled(self) -> bool:
+        """Whether the face is fitted."""
+        return not self.shape.analytic
+
+    def rails(self, t: Array) -> Array:
+        """The edges at t: points (n, 2 sides, layers, 3).
+
+        A layer at distance d over an apex ends where q + v a - d c = 0 (design.md, section 7).
+        """
+        if self.layers == (0.0,):
+            jet = self.patch.jet(t, 0)
+            v = np.stack([jet.v_from[0], jet.v_to[0]], axis=1)
+            return np.asarray((jet.c0[0][:, None] + v[..., None] * jet.e[0][:, None])[:, :, None])
+        f = self.patch.frame(t)
+        v = np.stack([f.v_from, f.v_to], axis=1)[:, :, None]  # (n, 2, 1)
+        d = np.array(self.layers)
+        tip = np.where(self.tips, (f.c / np.where(f.a == 0.0, 1.0, f.a))[:, None], 0.0)
+        v = v + tip[:, :, None] * d
+        along = v[..., None] * f.e[:, None, None]
+        return np.asarray(f.c0[:, None, None] + along + d[:, None] * f.n[:, None, None])
+
+    def slopes(self, t: Array) -> Array:
+        """d/dt of ``rails``, (n, 2 sides, layers, 3)."""
+        if self.layers == (0.0,):
+            jet = self.patch.jet(t, 1)
+            return np.stack([jet.rail(v)[1] for v in (jet.v_from, jet.v_to)], axis=1)[:, :, None]
+        f = self.patch.frame_jet(t, 1)
+        out = np.zeros((t.size, 2, len(self.layers), 3))
+        for side, v in enumerate((f.ruling.v_from, f.ruling.v_to)):
+            for k, d in enumerate(self.layers):
+                height = v + d * taylor.div(f.c, f.a) if self.tips[side] else v
+                out[:, side, k] = (f.ruling.rail(height) + d * f.n)[1]
+        return out
+
+
+def strips(panel: Panel) -> tuple[list[Strip], int]:
+    """The strips of a panel in order, and the number of its stations.
+
+    A tube's last strip ends at station 0. A non-orientable band stays open in the topology: its
+    faces cannot all show the front at the seam.
+    """
+    layers = (-0.5 * panel.thickness, 0.5 * panel.thickness) if panel.thickness else (0.0,)
+    chain = panel.chain
+    around = chain.closed and chain.orientable
+    out: list[Strip] = []
+    size = panel_size(panel)
+    for patch, shape in zip(chain.patches, panel.shapes, strict=True):
+        whole = Strip(patch, shape, layers, _plain(patch.segments), 0, 1, _tips(patch, size))
+        alone = around and len(chain.patches) == 1
+        cuts = _analytic_cuts(whole, alone) if shape.analytic else _fitted_cuts(whole, alone)
+        if shape.analytic:
+            courses = [_plain(_within(patch.segments, a, b)) for a, b in _pairs(cuts)]
+        else:
+            courses = smooth_courses(lambda t, w=whole: _flat(w.slopes(t)), patch.segments, cuts)
+        for course in courses:
+            k = len(out)
+            out.append(Strip(patch, shape, layers, course, k, k + 1, whole.tips))
+    count = len(out) if around else len(out) + 1
+    out[-1] = replace(out[-1], last=out[-1].last % count)
+    return out, count
+
+
+def panel_size(panel: Panel) -> float:
+    """The diagonal of the box around samples of the panel's edges, mm."""
+    points = []
+    for patch in panel.chain.patches:
+        t = np.linspace(*patch.domain, 33)
+        jet = patch.jet(t, 0)
+        points += [jet.rail(v)[0] for v in (jet.v_from, jet.v_to)]
+    box = np.ptp(np.concatenate(points), axis=0)
+    return float(np.linalg.norm(box))
+
+
+def smooth_courses(slopes: Callable[[Array], Array], breaks: Array, cuts: Array) -> list[Course]:
+    """Courses between the cuts, cut again at every break where no scaling of t makes the curves
+    C1; ``slopes`` gives d/dt of all of them, (n, k)."""
+    runs: list[list[float]] = [[float(cuts[0])]]
+    scales: list[list[float]] = [[]]
+    borders = np.unique(np.concatenate([breaks, cuts]))
+    borders = borders[(borders >= cuts[0]) & (borders <= cuts[-1])]
+    scale = 1.0
+    for k, (a, b) in enumerate(_pairs(borders)):
+        if k:
+            ratio = None if a in cuts else _speed_ratio(slopes, borders[k - 1], a, b)
+            if ratio is None:
+                runs.append([float(a)])
+                scales.append([])
+                scale = 1.0
+            else:
+                scale *= ratio
+        runs[-1].append(float(b))
+        scales[-1].append(scale)
+    return [
+        Course(np.array(t), t[0] + np.concatenate([[0.0], np.cumsum(np.diff(t) * w)]))
+        for t, w in zip(runs, scales, strict=True)
+    ]
+
+
+def _speed_ratio(
+    slopes: Callable[[Array], Array], before: float, at: float, after: float
+) -> float | None:
+    """|slope after| / |slope before| at a break, or None where their directions differ."""
+    step = 1e-5 * min(at - before, after - at)
+    near = slopes(at + step * np.array([-2.0, -1.0, 1.0, 2.0]))
+    left, right = 2.0 * near[1] - near[0], 2.0 * near[2] - near[3]  # error of second order
+    sizes = float(np.linalg.norm(left)), float(np.linalg.norm(right))
+    if min(sizes) == 0.0:
+        return None
+    ratio = sizes[1] / sizes[0]
+    if np.linalg.norm(right - ratio * left) > SMOOTH_SPEED * sizes[1]:
+        return None
+    return 1.0 if abs(ratio - 1.0) <= SMOOTH_SPEED else ratio
+
+
+def _analytic_cuts(strip: Strip, alone: bool) -> Array:
+    """Where a plane, cylinder or cone is cut: in halves of its turning when it closes alone, and
+    into pieces below a whole turn."""
+    start, end = strip.ends
+    t = np.linspace(start, end, SAMPLES)
+    turning = _turning(strip.patch, t)
+    parts = ANALYTIC_PARTS if alone else 1
+    if turning[-1] >= 2.0 * np.pi * (1.0 - 1e-6):
+        parts = max(parts, int(np.ceil(turning[-1] / np.pi - 1e-6)))
+    inner = np.interp(turning[-1] * np.arange(1, parts) / parts, turning, t)
+    return np.concatenate([[start], inner, [end]])
+
+
+def _turning(patch: Patch, t: Array) -> Array:
+    """The accumulated angle about the axis of a cylinder, cone or plane fan along t, (n,).
+
+    On a cone of half angle h the rulings turn by sin h and the normals by cos h of that angle.
+    """
+    f = patch.frame(t)
+    steps = [
+        np.arctan2(np.linalg.norm(np.cross(x[:-1], x[1:]), axis=1), np.sum(x[:-1] * x[1:], axis=1))
+        for x in (f.n, f.e)
+    ]
+    return np.concatenate([[0.0], np.cumsum(np.hypot(*steps))])
+
+
+def _fitted_cuts(strip: Strip, alone: bool) -> Array:
+    """Where a fitted surface is cut: in quarters of its length when it closes alone."""
+    start, end = strip.ends
+    if not alone:
+        return np.array([start, end])
+    t = np.linspace(start, end, SAMPLES)
+    middle = strip.rails(t).mean(axis=(1, 2))
+    length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(middle, axis=0), axis=1))])
+    share = np.arange(1, FITTED_PARTS) / FITTED_PARTS
+    cuts = np.interp(share * length[-1], length, t)
+    for b in strip.patch.breaks:  # a break nearby is the cheaper place
+        near = int(np.argmin(np.abs(cuts - b)))
+        if abs(cuts[near] - b) < 0.05 * (end - start):
+            cuts[near] = b
+    return np.concatenate([[start], np.unique(cuts), [end]])
+
+
+def _tips(patch: Patch, size: float) -> tuple[bool, bool]:
+    """Whether the from side and the to side are drawn together in one point."""
+    jet = patch.jet(np.linspace(*patch.domain, 17), 0)
+    rails = (jet.rail(v)[0] for v in (jet.v_from, jet.v_to))
+    low, high = (bool(np.abs(x - x[0]).max() <= FLOOR * size) for x in rails)
+    if low and high:
+        raise GeometryError("both long edges of a patch are drawn together in a point")
+    return low, high
+
+
+def _plain(t: Array) -> Course:
+    return Course(t, t)
+
+
+def _within(borders: Array, a: float, b: float) -> Array:
+    inner = borders[(borders > a) & (borders < b)]
+    return np.concatenate([[a], inner, [b]])
+
+
+def _flat(x: Array) -> Array:
+    return x.reshape(len(x), -1)
+
+
+def _pairs(x: Array) -> zip[tuple[float, float]]:
+    return zip(x[:-1], x[1:], strict=True)

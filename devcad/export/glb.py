@@ -1,0 +1,364 @@
+"""glTF 2.0 binary: metres, Y up, UV0 = the flat pattern; one node and one mesh a panel.
+
+A vertex (x, y, z) in mm is written as (x, z, -y) / 1000, its pattern place (X, Y) as
+((X - xmin) / L, 1 - (Y - ymin) / L). L is one number for the whole file, the largest side of
+all the panels' patterns, so that a texture has one scale; xmin and ymin are each panel's own,
+so that the charts of several panels lie over one another in [0, 1]. Nothing packs them side by
+side yet.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from devcad import __version__
+from devcad.checks import Check, at_most
+from devcad.errors import LimitError
+from devcad.export import Options, Written
+from devcad.export.binary import FLOAT32_STEP, apart, blocks, demanded, largest, opened, torn
+from devcad.geometry.taylor import Array
+from devcad.part import Panel, Part
+from devcad.units import METRES_PER_MM
+
+Floats = NDArray[np.float32]
+Json = dict[str, Any]
+
+CHECK = "glb-readback"
+
+MAGIC, VERSION = 0x46546C67, 2  # "glTF"
+JSON_CHUNK, BIN_CHUNK = 0x4E4F534A, 0x004E4942  # "JSON", "BIN"
+VERTEX_TARGET, INDEX_TARGET = 34962, 34963
+FLOAT = 5126
+INDEX_TYPES = {2: 5123, 4: 5125}  # bytes an index -> component type
+MOST_SHORT_VERTICES = 0xFFFF  # 65535 restarts a strip and is no index
+MOST_BYTES = 0xFFFFFFFF  # the file's length is a 32-bit number
+
+METALLIC, ROUGHNESS = 0.2, 0.6  # a metal of 1.0 is black in a viewer without an environment
+NORMAL_LIMIT = 1e-6
+"""A unit vector rounded to float32 is off by 6e-8 a component; the mesh's own by far less."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Piece:
+    """A panel with its indices, flat (3 m,) unsigned, and the affine map of its pattern to UV."""
+
+    panel: Panel
+    indices: NDArray[Any]
+    corner: tuple[float, float]
+    side: float
+
+    @property
+    def sizes(self) -> tuple[int, int, int, int]:
+        """Bytes of positions, normals, texture places and indices, each a multiple of 4."""
+        n = len(self.panel.mesh.vertices)
+        return 12 * n, 12 * n, 8 * n, _padded(self.indices.nbytes)
+
+
+def write(part: Part, folder: Path, options: Options) -> list[Written]:
+    """One file ``<part>.glb`` in the folder, read back.
+
+    ``max_deviation`` is the mesh's own certified deviation plus the measured rounding to
+    float32, the largest over the panels. ``checks`` holds that rounding for each panel as
+    ``glb-readback``; normals, texture places, indices and bounds that were read are compared
+    too. Triangles that use a vertex twice are left out. Normals are written with unit length.
+
+    Raises:
+        CheckFailed: ``glb-readback``, the file does not hold the mesh.
+        LimitError: more than 4 GiB.
+        FileError: the file cannot be written.
+    Source:
+        Khronos, glTF 2.0 Specification, sections 3.6 to 3.9 and 4.4.
+    """
+    path = folder / f"{part.name}.glb"
+    pieces = _pieces(part)
+    text = json.dumps(_document(part, pieces), separators=(",", ":"), allow_nan=False).encode()
+    text = text.ljust(_padded(len(text)))
+    size = sum(sum(piece.sizes) for piece in pieces)
+    total = 12 + 8 + len(text) + 8 + size
+    if total > MOST_BYTES:
+        raise LimitError(
+            f"a GLB file of {total} bytes, limit {MOST_BYTES}",
+            place=path.name,
+            value=total,
+            limit=MOST_BYTES,
+            remedy="raise the tolerance",
+        )
+    with opened(path, "wb") as stream:
+        stream.write(np.array([MAGIC, VERSION, total, len(text), JSON_CHUNK], "<u4").tobytes())
+        stream.write(text)
+        stream.write(np.array([size, BIN_CHUNK], "<u4").tobytes())
+        for piece in pieces:
+            _write_piece(stream, piece)
+    checks = _read_back(path, pieces, total)
+    deviation = max(
+        piece.panel.mesh.deviation + check.value
+        for piece, check in zip(pieces, checks, strict=True)
+    )
+    return [Written(path, "glb", float(deviation), checks)]
+
+
+def linear(colour: tuple[float, float, float]) -> list[float]:
+    """The linear intensities of an sRGB colour, components 0..1, as glTF wants them.
+
+    Source: IEC 61966-2-1.
+    """
+    return [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in colour]
+
+
+def _padded(size: int) -> int:
+    return -(-size // 4) * 4
+
+
+def _pieces(part: Part) -> list[_Piece]:
+    """The panels in order, with one texture scale."""
+    boxes = [panel.pattern.bbox for panel in part.panels]
+    side = max(max(box[2] - box[0], box[3] - box[1]) for box in boxes)
+    return [
+        _Piece(panel, _indices(panel), (box[0], box[1]), side)
+        for panel, box in zip(part.panels, boxes, strict=True)
+    ]
+
+
+def _indices(panel: Panel) -> NDArray[Any]:
+    """The triangles' indices in the shortest type that holds them."""
+    triangles = panel.mesh.triangles
+    a, b, c = triangles.T
+    degenerate = (a == b) | (b == c) | (c == a)
+    if degenerate.any():
+        triangles = triangles[~degenerate]
+    short = len(panel.mesh.vertices) <= MOST_SHORT_VERTICES
+    return np.ascontiguousarray(triangles, "<u2" if short else "<u4").ravel()
+
+
+def _positions(points: Array) -> Floats:
+    """Points (k, 3) in mm -> metres, Y up."""
+    out = np.empty(points.shape, "<f4")
+    x, y, z = points.T
+    out[:, 0] = x * METRES_PER_MM
+    out[:, 1] = z * METRES_PER_MM
+    out[:, 2] = y * -METRES_PER_MM
+    out += np.float32(0.0)  # -0 + 0 = +0, so that equal points have equal bits
+    return out
+
+
+def _normals(normals: Array) -> Floats:
+    """Normals (k, 3), Y up, unit."""
+    x, y, z = normals.T
+    length = np.sqrt(x * x + y * y + z * z)
+    length[length == 0.0] = np.nan  # no direction: the read-back refuses it
+    out = np.empty(normals.shape, "<f4")
+    out[:, 0] = x / length
+    out[:, 1] = z / length
+    out[:, 2] = y / -length
+    return out
+
+
+def _texture(piece: _Piece) -> Callable[[Array], Floats]:
+    """The map from pattern places (k, 2) in mm to UV0; glTF counts v downwards."""
+
+    def places(flat: Array) -> Floats:
+        out = np.empty(flat.shape, "<f4")
+        out[:, 0] = (flat[:, 0] - piece.corner[0]) / piece.side
+        out[:, 1] = 1.0 - (flat[:, 1] - piece.corner[1]) / piece.side
+        return np.clip(out, 0.0, 1.0, out=out)  # rounding only: the bounding box is exact
+
+    return places
+
+
+def _write_piece(stream: BinaryIO, piece: _Piece) -> None:
+    """Append positions, normals, texture places and indices, padded to 4 bytes."""
+    mesh = piece.panel.mesh
+    for values, convert in (
+        (mesh.vertices, _positions),
+        (mesh.normals, _normals),
+        (mesh.flat, _texture(piece)),
+    ):
+        for rows in blocks(len(values)):
+            stream.write(convert(values[rows]).data)
+    stream.write(piece.indices.data)
+    stream.write(bytes(piece.sizes[3] - piece.indices.nbytes))
+
+
+def _document(part: Part, pieces: list[_Piece]) -> Json:
+    """The JSON chunk, its keys in a fixed order."""
+    number = {"part_number": part.part_number} if part.part_number else {}
+    scale = {"mm_per_uv": pieces[0].side, "units": "mm"}
+    views, accessors = _tables(pieces)
+    return {
+        "asset": {"generator": f"devcad {__version__}", "version": "2.0"},
+        "extras": scale | number,
+        "scene": 0,
+        # no scene name: three.js would rename the panel that has the job's name
+        "scenes": [{"nodes": list(range(len(pieces)))}],
+        "nodes": [
+            {"name": piece.panel.name, "mesh": k, "extras": _extras(piece, scale | number)}
+            for k, piece in enumerate(pieces)
+        ],
+        "meshes": [_mesh(piece, k, scale | number) for k, piece in enumerate(pieces)],
+        "materials": [_material(part)],
+        "accessors": accessors,
+        "bufferViews": views,
+        "buffers": [{"byteLength": sum(sum(piece.sizes) for piece in pieces)}],
+    }
+
+
+def _extras(piece: _Piece, common: Json) -> Json:
+    """A panel's facts; on node and mesh, for viewers show one of the two."""
+    panel = piece.panel
+    return common | {"thickness": panel.thickness, "area": panel.pattern.area}
+
+
+def _mesh(piece: _Piece, k: int, common: Json) -> Json:
+    attributes = {"POSITION": 4 * k, "NORMAL": 4 * k + 1, "TEXCOORD_0": 4 * k + 2}
+    return {
+        "name": piece.panel.name,
+        "primitives": [{"attributes": attributes, "indices": 4 * k + 3, "material": 0}],
+        "extras": _extras(piece, common),
+    }
+
+
+def _material(part: Part) -> Json:
+    return {
+        "name": "sheet",
+        "pbrMetallicRoughness": {
+            "baseColorFactor": [*linear(part.colour), 1.0],
+            "metallicFactor": METALLIC,
+            "roughnessFactor": ROUGHNESS,
+        },
+        "doubleSided": True,
+    }
+
+
+def _tables(pieces: list[_Piece]) -> tuple[list[Json], list[Json]]:
+    """Buffer views and accessors, four of each a panel, in the order of the bytes."""
+    views: list[Json] = []
+    accessors: list[Json] = []
+    offset = 0
+    for piece in pieces:
+        index_type = INDEX_TYPES[piece.indices.itemsize]
+        count = len(piece.panel.mesh.vertices)
+        rows = [
+            (VERTEX_TARGET, FLOAT, count, "VEC3", _bounds(piece.panel.mesh.vertices)),
+            (VERTEX_TARGET, FLOAT, count, "VEC3", {}),
+            (VERTEX_TARGET, FLOAT, count, "VEC2", {}),
+            (INDEX_TARGET, index_type, piece.indices.size, "SCALAR", {}),
+        ]
+        for (target, kind, number, shape, bounds), size in zip(rows, piece.sizes, strict=True):
+            length = piece.indices.nbytes if target == INDEX_TARGET else size
+            accessors.append(
+                {"bufferView": len(views), "componentType": kind, "count": number, "type": shape}
+                | bounds
+            )
+            views.append(
+                {"buffer": 0, "byteOffset": offset, "byteLength": length, "target": target}
+            )
+            offset += size
+    return views, accessors
+
+
+def _bounds(vertices: Array) -> Json:
+    """Exact bounds of the positions written: rounding is monotone, so it may come last."""
+    columns = [vertices[:, k] for k in range(3)]
+    ends = _positions(np.array([[f(c) for c in columns] for f in (np.min, np.max)]))
+    return {"min": ends.min(axis=0).tolist(), "max": ends.max(axis=0).tolist()}
+
+
+def _read_back(path: Path, pieces: list[_Piece], total: int) -> tuple[Check, ...]:
+    """Parse the file by its own tables and compare it with the meshes."""
+    document, data = _parse(path, total)
+    moved = []
+    for node, piece in zip(document["nodes"], pieces, strict=True):
+        (primitive,) = document["meshes"][node["mesh"]]["primitives"]
+        attributes = primitive["attributes"]
+        position = _accessor(document, data, attributes["POSITION"])
+        normal = _accessor(document, data, attributes["NORMAL"])
+        place = _accessor(document, data, attributes["TEXCOORD_0"])
+        indices = _accessor(document, data, primitive["indices"])
+        bounds = document["accessors"][attributes["POSITION"]]
+        columns = [position[:, k] for k in range(3)]
+        if [float(c.min()) for c in columns] != bounds["min"] or [
+            float(c.max()) for c in columns
+        ] != bounds["max"]:
+            raise torn(CHECK, path, "bounds are not exact", panel=piece.panel.name)
+        if not np.array_equal(indices.ravel(), piece.indices):
+            raise torn(CHECK, path, "the indices read differ", panel=piece.panel.name)
+        checks = _checks(piece, document["extras"]["mm_per_uv"], position, normal, place)
+        moved.append(demanded(checks, path)[0])
+    return tuple(moved)
+
+
+def _parse(path: Path, total: int) -> tuple[Json, NDArray[np.uint8]]:
+    """The JSON and the binary chunk of a GLB file whose lengths agree with one another."""
+    with opened(path, "rb") as stream:
+        actual = path.stat().st_size
+        if actual != total:
+            raise torn(CHECK, path, f"{actual} bytes, not {total}")
+        *head, told, size, kind = np.fromfile(stream, "<u4", 5).tolist()
+        text = stream.read(size)
+        rest = np.fromfile(stream, np.uint8)
+    length, binary = rest[:8].view("<u4").tolist() if rest.size >= 8 else (0, 0)
+    if (*head, told, kind, binary) != (MAGIC, VERSION, total, JSON_CHUNK, BIN_CHUNK):
+        raise torn(CHECK, path, "damaged chunk headers")
+    try:
+        document: Json = json.loads(text)
+    except ValueError:
+        raise torn(CHECK, path, "damaged JSON") from None
+    if length != rest.size - 8 or length != document["buffers"][0]["byteLength"]:
+        raise torn(CHECK, path, "the lengths of the chunks disagree")
+    return document, rest[8:]
+
+
+def _accessor(document: Json, data: NDArray[np.uint8], index: int) -> NDArray[Any]:
+    """The numbers of an accessor, (count, components); a view into the data."""
+    accessor = document["accessors"][index]
+    view = document["bufferViews"][accessor["bufferView"]]
+    kind = {5126: "<f4", 5123: "<u2", 5125: "<u4"}[accessor["componentType"]]
+    width = {"SCALAR": 1, "VEC2": 2, "VEC3": 3}[accessor["type"]]
+    piece = data[view["byteOffset"] : view["byteOffset"] + view["byteLength"]]
+    return piece.view(kind).reshape(accessor["count"], width)
+
+
+def _checks(
+    piece: _Piece, mm_per_uv: float, position: Floats, normal: Floats, place: Floats
+) -> list[Check]:
+    """Distances between what was read and the mesh, each against what float32 allows."""
+    mesh, name = piece.panel.mesh, piece.panel.name
+    x, y = piece.corner
+    moved = apart(position, [(0, 1e3, 0.0), (2, -1e3, 0.0), (1, 1e3, 0.0)], mesh.vertices)
+    turned = apart(normal, [(0, 1.0, 0.0), (2, -1.0, 0.0), (1, 1.0, 0.0)], mesh.normals)
+    slid = apart(place, [(0, mm_per_uv, x), (1, -mm_per_uv, y + mm_per_uv)], mesh.flat)
+    step = FLOAT32_STEP * largest(mesh.vertices)
+    return [
+        at_most(
+            CHECK,
+            name,
+            moved,
+            step,
+            "mm",
+            says=f"the vertices read lie up to {moved:.3g} mm from the mesh's",
+            remedy="move the part nearer to the origin",
+        ),
+        at_most(
+            CHECK,
+            name,
+            slid,
+            FLOAT32_STEP * (mm_per_uv + max(abs(x), abs(y))),
+            "mm",
+            says=f"the texture places read lie up to {slid:.3g} mm from the pattern's",
+        ),
+        at_most(
+            CHECK,
+            name,
+            turned,
+            NORMAL_LIMIT,
+            "1",
+            says=f"the normals read differ by up to {turned:.3g} from the mesh's, or are not unit",
+        ),
+    ]

@@ -1,0 +1,99 @@
+"""What the report says of a panel (design.md, section 6): plain numbers and words."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from devcad.checks import Check
+from devcad.flatten.outline import enclosed_area, perimeter
+from devcad.geometry.chain import Chain
+from devcad.geometry.classify import EXACT, Shape, sample_parameters
+from devcad.geometry.regularity import regression_curve, singularities, smallest_radius
+from devcad.part import Panel
+
+
+def panel_facts(
+    panel: Panel,
+    middle: Chain,
+    shapes: tuple[Shape, ...],
+    checks: list[Check],
+    apex: bool,
+    allowed: list[str],
+) -> dict[str, Any]:
+    """The panel's entry in report.json, in its order; what does not exist is None."""
+    by_name = {check.name: check for check in checks}
+    radius = min(smallest_radius(patch).value for patch in middle.patches)
+    angle = middle.closing_angle
+    return {
+        "name": panel.name,
+        "kind": panel.kind,
+        "type": _type(middle, shapes),
+        "causal": middle.patches[0].causal,
+        "closed": middle.closed,
+        "closes": middle.closes,
+        "closing_angle_deg": None if angle is None else float(np.degrees(angle)),
+        "orientable": middle.orientable,
+        "watertight": panel.mesh.watertight,
+        "apex": apex,
+        "area": panel.pattern.area,
+        "flat_area": enclosed_area(panel.pattern.outline),
+        "flat_bbox": list(panel.pattern.bbox),
+        "min_radius": _finite(radius),
+        "max_twist_deg": _finite(by_name["twist"].value),
+        "max_crease_deg": None,
+        "relaxed_mm": None,
+        "k_neutral": None,
+        "k_source": None,
+        "clearance": _finite(by_name["regular"].value),
+        "singularities": [
+            {"t": s.t, "point": s.point.tolist(), "type": s.type}
+            for patch, shape in zip(middle.patches, shapes, strict=True)
+            for s in singularities(patch, shape)
+        ],
+        "regression": _regression(middle, shapes),
+        "ruling_count": sum(len(t) - 1 for t in panel.rulings) + 1,
+        "cut_length": perimeter(panel.pattern.outline),
+        "pierces": 1 + len(panel.pattern.holes),
+        "mass_g": None,
+        "allowed": allowed,
+    }
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
+
+
+def _regression(chain: Chain, shapes: tuple[Shape, ...]) -> dict[str, Any] | None:
+    """The regression curve of the patches that have one, sampled."""
+    curves = [
+        regression_curve(patch)
+        for patch, shape in zip(chain.patches, shapes, strict=True)
+        if shape.type in ("cone", "tangent")
+    ]
+    found = [curve for curve in curves if curve is not None]
+    if not found:
+        return None
+    return {
+        "t": np.concatenate([t for t, _ in found]).tolist(),
+        "points": np.concatenate([points for _, points in found]).tolist(),
+    }
+
+
+def _type(chain: Chain, shapes: tuple[Shape, ...]) -> str:
+    """The type of the whole: of its one patch, or a prism, or a pyramid, or mixed."""
+    if len(shapes) == 1:
+        return shapes[0].type
+    frames = [patch.frame(sample_parameters(patch, 9)) for patch in chain.patches]
+    if all(shape.type == "plane" for shape in shapes) and all(j.smooth for j in chain.joints):
+        return "plane"
+    e = np.concatenate([frame.e for frame in frames])
+    c0 = np.concatenate([frame.c0 for frame in frames])
+    if np.linalg.norm(e - e[0], axis=1).max() <= EXACT:
+        return "cylinder"
+    across = np.eye(3) - e[:, :, None] * e[:, None, :]
+    apex = np.linalg.solve(across.sum(axis=0), np.einsum("nij,nj->i", across, c0))
+    missed = np.linalg.norm(np.einsum("nij,nj->ni", across, apex - c0), axis=1).max()
+    size = float(np.linalg.norm(np.ptp(c0, axis=0))) + float(np.linalg.norm(apex - c0[0]))
+    return "cone" if missed <= EXACT * size else "mixed"

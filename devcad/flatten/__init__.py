@@ -1,0 +1,1 @@
+"""Flattening: the isometric development of patches and its outline as lines and arcs."""

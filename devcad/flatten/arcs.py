@@ -1,0 +1,290 @@
+"""Pattern edges as straight lines and circular arcs: exact where they are ones, otherwise the
+fewest tangent continuous arcs within a tolerance."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from devcad.errors import CheckFailed
+from devcad.flatten import loops
+from devcad.flatten.arcsearch import Nodes, fewest_arcs
+from devcad.flatten.edges import closes_smoothly, smooth_edges
+from devcad.flatten.loops import Loop, Path
+from devcad.flatten.measure import deviation
+from devcad.flatten.pattern import Edge
+from devcad.flatten.trace import Trace, trace, turns, unit_tangents
+from devcad.geometry.taylor import Array
+
+EXACT = 1e-9  # of a piece's size: design.md section 7, the scale of every "is it zero"
+NOISE = 2e-11  # of the edge's size: the accuracy of a pattern, 1e-9 mm per 100 mm, twice
+SHORTEST = 0.01  # mm; cutters stumble over shorter segments
+PER_ARC = 12.0  # nodes tried for each arc expected: more costs time, saves at most one arc in 20
+
+Keep = tuple[float | None, float | None]
+"""Directions in radians to keep at the start and the end, None where they are free."""
+
+Fit = Callable[[Trace, float, Keep], Path]
+"""traced edge, tolerance, directions to keep -> path."""
+
+Pieces = list[tuple[int, int, "Path | None"]]
+"""Stretches of a trace, (first sample, last sample, exact path or None), end to end."""
+
+
+def fit_outline(outline: tuple[Edge, ...], tolerance: float) -> Loop:
+    """A closed outline as lines and arcs, counterclockwise, within ``tolerance`` (mm).
+
+    Each edge is fitted by itself: straight lines and circular arcs are recognised, other
+    pieces become tangent continuous arcs, and edges that continue each other smoothly keep a
+    common tangent. Corners are the edges' first points; edges shorter than 1e-9 of the outline
+    are dropped. No arc sweeps more than half a turn, none is shorter than 0.01 mm unless its
+    edge is or the tolerance asks for it. ``deviation`` is measured on the true curves.
+
+    Raises:
+        CheckFailed: the tolerance cannot be kept (it is below the rounding of the numbers).
+    """
+    return assemble(outline, tolerance, fit_trace)
+
+
+def fit_edge(edge: Edge, tolerance: float, keep: Keep = (None, None)) -> Path:
+    """One edge as lines and arcs within ``tolerance`` (mm), as in :func:`fit_outline`.
+
+    ``keep``: the directions (radians) to keep at the two ends, None where they are free.
+    """
+    return fit_trace(trace(edge, tolerance / 50.0), tolerance, keep)
+
+
+def assemble(outline: tuple[Edge, ...], tolerance: float, fit: Fit) -> Loop:
+    """The closed loop of all edges, each turned into a path by ``fit``, counterclockwise."""
+    traces, keep = traced_edges(outline, tolerance)
+    corners = [kept.points[0] for kept in traces]
+    paths = [fit(kept, tolerance, keep) for kept in traces]
+    points = [
+        part
+        for corner, path in zip(corners, paths, strict=True)
+        for part in (corner[None], path.points[1:-1])
+    ]
+    gaps = [
+        float(np.hypot(*(kept.points[-1] - corner)))
+        for kept, corner in zip(traces, corners[1:] + corners[:1], strict=True)
+    ]
+    loop = Loop(
+        np.concatenate(points),
+        np.concatenate([path.bulges for path in paths]),
+        all(path.exact for path in paths),
+        max(max(path.deviation for path in paths), *gaps),
+    )
+    return loops.counterclockwise(loop)
+
+
+def traced_edges(outline: tuple[Edge, ...], tolerance: float) -> tuple[list[Trace], Keep]:
+    """The traces of an outline from corner to corner, and the directions each has to keep."""
+    edges = smooth_edges(outline)
+    traces = [trace(edge, tolerance / 50.0) for edge in edges]
+    seam = _angle(traces[0].tangents[0]) if closes_smoothly(edges) else None
+    return traces, (seam, seam)
+
+
+def fit_trace(traced: Trace, tolerance: float, keep: Keep) -> Path:
+    """A traced edge as lines and arcs, measured; see :func:`fit_edge`."""
+    aim = 0.99 * tolerance
+    stretches = pieces(traced)
+    for _ in range(6):
+        path = _join(traced, stretches, aim, keep)
+        found = deviation(traced, path.points, path.bulges)
+        if found <= tolerance or path.exact:
+            return replace(path, deviation=found)
+        aim *= min(0.95, 0.98 * tolerance / found)
+    raise CheckFailed(
+        f"an outline cannot be fitted: {found:.3g} mm off, limit {tolerance:.3g} mm",
+        value=found,
+        limit=tolerance,
+        remedy="use a larger tolerance",
+    )
+
+
+def _join(traced: Trace, stretches: Pieces, tolerance: float, keep: Keep) -> Path:
+    """Exact pieces and fitted ones, end to end, tangent continuous."""
+    parts: list[Path] = []
+    for k, (i, j, exact) in enumerate(stretches):
+        if exact is not None:
+            parts.append(exact)
+            continue
+        start = keep[0] if k == 0 else end_direction(stretches[k - 1][2], last=True)
+        end = keep[1] if k == len(stretches) - 1 else end_direction(stretches[k + 1][2], last=False)
+        points, bulges = _fit_free(traced, i, j, tolerance, start, end)
+        parts.append(Path(points, bulges, False, 0.0))
+    inner = [part.points[:-1] for part in parts]
+    return Path(
+        np.concatenate([*inner, traced.points[-1:]]),
+        np.concatenate([part.bulges for part in parts]),
+        all(part.exact for part in parts),
+        0.0,
+    )
+
+
+def end_direction(path: Path | None, *, last: bool) -> float | None:
+    """The direction of an exact path at its end or start."""
+    if path is None:
+        return None
+    k = -1 if last else 0
+    chord = path.points[1:][k] - path.points[:-1][k]
+    half = float(loops.half_sweeps(path.bulges)[k])
+    return _angle(chord) + (half if last else -half)
+
+
+def _angle(vector: Array) -> float:
+    return float(np.arctan2(vector[1], vector[0]))
+
+
+def _fit_free(
+    traced: Trace, i: int, j: int, tolerance: float, start: float | None, end: float | None
+) -> tuple[Array, Array]:
+    """Points and bulges of the fewest arcs along samples i to j of a trace."""
+    short = bool(traced.s[j] - traced.s[i] <= SHORTEST)
+    density = _density(traced, i, j, tolerance)
+    for attempt in range(7):
+        nodes = _nodes(traced, i, j, density, PER_ARC * 2.0**attempt)
+        for shortest in (
+            (SHORTEST, 0.0) if attempt == 6 and not short else (SHORTEST * (not short),)
+        ):
+            point, fine, angles = nodes
+            found = fewest_arcs(Nodes(point, fine, angles, start, end, tolerance, shortest))
+            if found is not None:
+                return _straightened(found, nodes[0], tolerance, start, end)
+    # Nothing smooth follows so closely: the samples themselves, which the tolerance placed.
+    return traced.points[i : j + 1], np.zeros(j - i)
+
+
+def _straightened(
+    found: tuple[Array, Array],
+    samples: Array,
+    tolerance: float,
+    start: float | None,
+    end: float | None,
+) -> tuple[Array, Array]:
+    """One arc that may as well be a line becomes one, if no direction has to be kept."""
+    points, bulges = found
+    if len(bulges) > 1 or start is not None or end is not None:
+        return found
+    many = np.ones(len(samples))
+    flat = loops.segment_distance(
+        many[:, None] * points[0], many[:, None] * points[1], 0.0 * many, samples
+    )
+    return (points, np.zeros(1)) if flat.max() <= tolerance else found
+
+
+def _density(traced: Trace, i: int, j: int, tolerance: float) -> Array:
+    """Arcs expected up to each sample i..j of a trace, (j - i + 1,), increasing from 0.
+
+    Arcs of length a on a curvature that changes by k' leave 0.008 k' a^3 (the third Bernoulli
+    polynomial's maximum over six); where k' vanishes a quarter of the mean is kept, so that
+    there are nodes everywhere, and never less than two arcs a turn.
+    """
+    s = traced.s[i : j + 1]
+    ds = np.maximum(np.diff(s), 1e-12 * (s[-1] - s[0]))
+    turn = turns(traced.tangents[i : j + 1])
+    curvature = turn / ds
+    change = np.abs(np.diff(curvature)) / (0.5 * (ds[:-1] + ds[1:]))
+    change = np.concatenate([change[:1], change, change[-1:]]) if len(change) else np.zeros(2)
+    rate = (0.008 * 0.5 * (change[:-1] + change[1:]) / tolerance) ** (1.0 / 3.0)
+    mean = float((rate * ds).sum() / ds.sum())
+    per_step = np.maximum(rate, 0.25 * mean) * ds + np.abs(turn) / np.pi + ds / ds.sum()
+    return np.concatenate([[0.0], np.cumsum(per_step)])
+
+
+def _nodes(
+    traced: Trace, i: int, j: int, density: Array, per_arc: float
+) -> tuple[Array, int, Array]:
+    """Points on samples i to j for the search, how many of them a node, directions at nodes."""
+    fine = 4
+    count = int(np.clip(np.ceil(per_arc * density[-1]), 16, 40000))
+    levels = np.linspace(0.0, density[-1], fine * count + 1)
+    u = np.interp(levels, density, traced.u[i : j + 1])
+    knots = traced.knots[(traced.knots > i) & (traced.knots < j)]
+    if len(knots) < count:  # where the curvature jumps, an arc should end
+        place = np.rint(density[knots - i] / density[-1] * count).astype(int)
+        u[fine * np.clip(place, 1, count - 1)] = traced.u[knots]
+        u = np.sort(u) if u[-1] >= u[0] else np.sort(u)[::-1]
+    points, slopes = traced.edge.curve(u)
+    points = points.copy()
+    points[0], points[-1] = traced.points[i], traced.points[j]
+    tangents, _ = unit_tangents(traced.edge, points, np.where(np.isfinite(slopes), slopes, 0.0))
+    return points, fine, np.arctan2(tangents[::fine, 1], tangents[::fine, 0])
+
+
+def pieces(traced: Trace) -> Pieces:
+    """A traced edge cut into lines and arcs, and the stretches between that are neither."""
+    whole = _recognise(traced, 0, len(traced.u) - 1)
+    if whole is not None:
+        return [(0, len(traced.u) - 1, whole)]
+    found: Pieces = []
+    for i, j in zip(traced.knots[:-1].tolist(), traced.knots[1:].tolist(), strict=True):
+        exact = _recognise(traced, i, j)
+        if exact is not None and traced.s[j] - traced.s[i] < SHORTEST:
+            exact = None
+        if found and exact is None and found[-1][2] is None:
+            found[-1] = (found[-1][0], j, None)
+            continue
+        if found and exact is not None and found[-1][2] is not None:
+            both = _recognise(traced, found[-1][0], j)
+            if both is not None:
+                found[-1] = (found[-1][0], j, both)
+                continue
+        found.append((i, j, exact))
+    return found
+
+
+def _recognise(traced: Trace, i: int, j: int) -> Path | None:
+    """The line or arc that samples i to j lie on, in segments of at most half a turn."""
+    points = traced.points[i : j + 1]
+    size = float(np.hypot(*np.ptp(points, axis=0)))
+    limit = EXACT * size + NOISE * traced.size
+    chord = points[-1] - points[0]
+    length = float(np.hypot(*chord))
+    if length > 2.0 * limit:
+        offset = loops.cross(chord, points - points[0]) / length
+        forward = np.diff(points @ chord)
+        if np.abs(offset).max() <= limit and np.all(forward > -limit * length):
+            return Path(points[[0, -1]], np.zeros(1), True, 0.0)
+    return _recognise_arc(points, turns(traced.tangents[i : j + 1]), size, limit)
+
+
+def _recognise_arc(points: Array, turn: Array, size: float, limit: float) -> Path | None:
+    """The circular arc through samples (n, 2), whose tangents turn by ``turn`` (n - 1,)."""
+    sweep = float(turn.sum())
+    if not 1e-9 < abs(sweep) < 2.0 * np.pi + 1e-6 or np.any(turn * np.sign(sweep) < -1e-6):
+        return None
+    if abs(sweep) < np.pi:
+        half = _common_half_sweep(points, limit)
+        if half is None:
+            return None
+        return Path(points[[0, -1]], np.array([np.tan(0.5 * half)]), True, 0.0)
+    middle = points.mean(axis=0)
+    x = (points - middle) / size
+    solution, *_ = np.linalg.lstsq(np.column_stack([2.0 * x, np.ones(len(x))]), loops.dot(x, x))
+    centre = solution[:2]
+    radii = np.hypot(*(x - centre).T)
+    if np.ptp(radii) * size > 2.0 * limit:
+        return None
+    angles = np.unwrap(np.arctan2(*(x - centre).T[::-1]))
+    sweep = float(angles[-1] - angles[0])
+    if abs(abs(sweep) - 2.0 * np.pi) * size < 4.0 * limit:
+        sweep = float(np.copysign(2.0 * np.pi, sweep))
+    parts = int(np.ceil(abs(sweep) / np.pi - 1e-9))
+    at = angles[0] + sweep * np.arange(1, parts) / parts
+    inner = middle + size * (centre + radii.mean() * loops.direction(at))
+    path = np.concatenate([points[:1], inner, points[-1:]])
+    return Path(path, np.full(parts, np.tan(0.25 * sweep / parts)), True, 0.0)
+
+
+def _common_half_sweep(points: Array, limit: float) -> float | None:
+    """Half the sweep of the arc from the first to the last point through all others."""
+    qa, bq = points[1:-1] - points[0], points[-1] - points[1:-1]
+    turned = np.arctan2(loops.cross(qa, bq), loops.dot(qa, bq))
+    chord = float(np.hypot(*(points[-1] - points[0])))
+    arms = np.sqrt(loops.dot(qa, qa) * loops.dot(bq, bq)) / chord  # mm of offset per radian
+    half = float((turned * arms**2).sum() / (arms**2).sum())
+    return half if np.all(np.abs(turned - half) * arms <= limit) else None

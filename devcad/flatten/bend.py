@@ -1,0 +1,51 @@
+"""Partly bent chains: the same pattern, bent less, as patches like any other."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from devcad.flatten.development import Development
+from devcad.flatten.fold import Folded, fold_chain
+from devcad.geometry import taylor
+from devcad.geometry.chain import Chain
+from devcad.geometry.patch import Patch, RulingJet
+from devcad.geometry.taylor import Array
+
+
+def bent(chain: Chain, developments: tuple[Development, ...], bend: float) -> Chain:
+    """The chain with c -> bend * c and every crease to bend * its angle, isometric throughout.
+
+    The first ruling and its frame stay where they are. A tube opens. Source: geometry.md, 14.
+    """
+    first = chain.patches[0].frame([chain.patches[0].domain[0]])
+    folded = fold_chain(developments, chain, first, bend)
+    return replace(
+        chain,
+        patches=tuple(_bent(p, f, bend) for p, f in zip(chain.patches, folded, strict=True)),
+        joints=tuple(replace(joint, angle=bend * joint.angle) for joint in chain.joints),
+        closing=None,
+    )
+
+
+def _bent(patch: Patch, folded: Folded, bend: float) -> Patch:
+    """The patch whose frame starts from the folded one and obeys the frame's own equations."""
+
+    def field(t: Array, order: int) -> RulingJet:
+        c0, e, m, n = (np.zeros((order + 1, len(t), 3)) for _ in range(4))
+        c0[0], e[0], m[0], n[0] = folded.frames(t)
+        jet = patch.frame_jet(t, max(order - 1, 0))
+        a, c, p, q = jet.a, bend * jet.c, jet.p, jet.q
+        for k in range(order):  # one more coefficient of the frame from the equations
+            so_far = slice(k + 1)
+            e[k + 1] = taylor.mul(a[so_far], m[so_far])[k] / (k + 1)
+            m[k + 1] = taylor.mul(c[so_far], n[so_far])[k] / (k + 1)
+            m[k + 1] -= taylor.mul(a[so_far], e[so_far])[k] / (k + 1)
+            n[k + 1] = -taylor.mul(c[so_far], m[so_far])[k] / (k + 1)
+            c0[k + 1] = taylor.mul(p[so_far], e[so_far])[k] / (k + 1)
+            c0[k + 1] += taylor.mul(q[so_far], m[so_far])[k] / (k + 1)
+        extent = patch.field(t, order)
+        return RulingJet(c0, e, extent.v_from, extent.v_to)
+
+    return replace(patch, field=field)

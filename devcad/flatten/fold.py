@@ -1,0 +1,150 @@
+"""Fold: the surface in space from its pattern and its bending alone.
+
+While a sheet is bent about the rulings of its pattern, the motion R(t) that carries the plane
+onto the tangent plane at ruling t obeys R' = R B(t), where B is the rotation at rate bend * c
+about the ruling's line in the pattern. R (3 x 4) is found by collocation at Chebyshev points,
+panel by panel: linear, hence without iteration, and accurate to rounding. With bend = 1 this
+rebuilds the part; with less it is the part partly bent, an exact isometry at every value.
+
+Source: geometry.md, 14; Hairer, Lubich and Wanner, Geometric Numerical Integration, II.1.2.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from devcad.flatten.development import Development
+from devcad.geometry import chebyshev
+from devcad.geometry.chain import Chain
+from devcad.geometry.chebyshev import Piecewise
+from devcad.geometry.patch import Frame
+from devcad.geometry.taylor import Array
+
+NODES = 17
+TURN = 1.5
+"""Largest bending and turning of one panel in radians: 17 nodes then reach rounding."""
+
+
+@dataclass(frozen=True, slots=True)
+class Folded:
+    """The motion of one patch's pattern into space: ``motion(t)`` is R as 12 numbers."""
+
+    development: Development
+    motion: Piecewise
+
+    def points(self, t: Array, v: Array) -> Array:
+        """The points in space of the pattern's points (t, v), each (n,), shape (n, 3)."""
+        motion = self.motion(t).reshape(-1, 3, 4)
+        flat = self.development.points(t, v)
+        return np.asarray(np.einsum("nij,nj->ni", motion[:, :, :2], flat) + motion[:, :, 3])
+
+    def frames(self, t: Array) -> tuple[Array, Array, Array, Array]:
+        """c0, e, m, n in space at t, each (n, 3)."""
+        motion = self.motion(t).reshape(-1, 3, 4)
+        direction = self.development.direction(t)
+        turn = motion[:, :, :2]
+        e = np.einsum("nij,nj->ni", turn, direction)
+        n = motion[:, :, 2]
+        c0 = np.einsum("nij,nj->ni", turn, self.development.origin(t)) + motion[:, :, 3]
+        return c0, e, np.cross(n, e), n
+
+
+def fold(development: Development, start: Array, bend: float) -> Folded:
+    """Bend a development from the motion ``start`` (3, 4) at its first ruling.
+
+    ``bend`` scales the bending c: 0 stays flat, 1 is the part. Reads the pattern and c only.
+    """
+    knots = _panels(development, bend)
+    low, high = knots[:-1], knots[1:]
+    t = np.stack(
+        [chebyshev.nodes(a, b, NODES) for a, b in zip(low.tolist(), high.tolist(), strict=True)]
+    )
+    generator = _generator(development, t.ravel(), bend).reshape(len(low), NODES, 4, 4)
+    quadrature = chebyshev.integration_of_values(NODES)
+    weights = 0.5 * (high - low)[:, None, None] * quadrature
+    # row i of R at node k: r_k = r_0 + sum_j w_kj r_j B_j, the same matrix for the three rows
+    system = -np.einsum("pkj,pjab->pkbja", weights, generator).reshape(
+        len(low), 4 * NODES, 4 * NODES
+    )
+    system += np.eye(4 * NODES)
+    starts = np.tile(np.eye(4), (NODES, 1))  # r_0 = each unit row: the panel's propagator
+    flow = np.linalg.solve(system, np.broadcast_to(starts, (len(low), 4 * NODES, 4)))
+    flow = flow.reshape(len(low), NODES, 4, 4).swapaxes(2, 3)
+    motions = np.empty((len(low), NODES, 12))
+    current = start
+    for panel, steps in enumerate(flow):
+        motions[panel] = (current @ steps).reshape(NODES, 12)
+        current = _orthonormal(motions[panel, -1].reshape(3, 4))
+    table = np.einsum("kj,pjd->pkd", chebyshev.transform(NODES), motions)
+    return Folded(development, Piecewise(knots, table))
+
+
+def fold_chain(
+    developments: tuple[Development, ...], chain: Chain, first: Frame, bend: float
+) -> tuple[Folded, ...]:
+    """Bend all patches of a chain; ``first`` is the frame at the start, which stays."""
+    motion = np.column_stack([first.e[0], first.m[0], first.n[0], first.c0[0]])
+    out: list[Folded] = []
+    for k, development in enumerate(developments):
+        if k:
+            motion = motion @ _crease(development, bend * chain.joints[k - 1].angle)
+        folded = fold(development, motion, bend)
+        motion = folded.motion(folded.motion.knots[-1:]).reshape(3, 4)
+        out.append(folded)
+    return tuple(out)
+
+
+def _panels(development: Development, bend: float) -> Array:
+    """The development's panels, divided so that none bends or turns by more than TURN."""
+    knots = development.series.knots
+    nodes = np.linspace(0.0, 1.0, 9)
+    t = knots[:-1, None] + np.diff(knots)[:, None] * nodes[1:-1]
+    values = development.series(t.ravel())
+    rate = np.abs(values[:, 3]).reshape(t.shape).max(axis=1) * abs(bend)
+    turn = np.abs(development.series.derivative()(t.ravel())[:, 0]).reshape(t.shape).max(axis=1)
+    # a panel of d nodes resolves polynomials of degree d - 1; the pattern may be of higher degree
+    degree = development.series.coefficients.shape[1] / NODES
+    parts = np.ceil(np.maximum((rate + turn) * np.diff(knots) / TURN, degree)).astype(int)
+    return np.concatenate(
+        [
+            *(
+                a + (b - a) * np.arange(n) / n
+                for a, b, n in zip(knots[:-1], knots[1:], np.maximum(parts, 1), strict=True)
+            ),
+            knots[-1:],
+        ]
+    )
+
+
+def _generator(development: Development, t: Array, bend: float) -> Array:
+    """The rotation at rate bend * c about the ruling's line, as (n, 4, 4) matrices."""
+    omega, x, y, c = development.series(t).T
+    rate = bend * c
+    u, w = rate * np.cos(omega), rate * np.sin(omega)
+    out = np.zeros((len(t), 4, 4))
+    out[:, 2, 0], out[:, 0, 2] = -w, w
+    out[:, 2, 1], out[:, 1, 2] = u, -u
+    out[:, 2, 3] = w * x - u * y  # -(axis x point)
+    return out
+
+
+def _crease(development: Development, angle: float) -> Array:
+    """The rotation by ``angle`` about the development's first ruling, (4, 4)."""
+    at = development.series.knots[:1]
+    axis = np.append(development.direction(at)[0], 0.0)
+    point = np.append(development.origin(at)[0], 0.0)
+    cross = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
+    turn = np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * (cross @ cross)
+    out = np.eye(4)
+    out[:3, :3] = turn
+    out[:3, 3] = point - turn @ point
+    return out
+
+
+def _orthonormal(motion: Array) -> Array:
+    """The motion with rounding removed from its rotation: one Newton step of the polar form."""
+    turn = motion[:, :3]
+    turn = 0.5 * turn @ (3.0 * np.eye(3) - turn.T @ turn)
+    return np.column_stack([turn, motion[:, 3]])

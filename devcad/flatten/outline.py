@@ -1,0 +1,186 @@
+"""The pattern of a chain: outline, reference lines, exact area and box."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable
+
+import numpy as np
+
+from devcad.flatten.development import Development
+from devcad.flatten.pattern import Edge, Line, Pattern, PlaneCurve
+from devcad.geometry import chebyshev
+from devcad.geometry.chain import Chain
+from devcad.geometry.patch import Patch
+from devcad.geometry.taylor import Array
+
+PlaneDensity = Callable[[Array, Array], Array]
+"""Points (n, 2) and derivatives (n, 2) -> densities (n,)."""
+COLLAPSED = 1e-12
+"""An edge shorter than this share of the pattern is a point: an apex."""
+LINE_EVERY = np.radians(15.0)
+"""A reference ruling is drawn after this much bending and turning."""
+
+
+def lay_out(
+    chain: Chain, developments: tuple[Development, ...], rulings: tuple[Array, ...]
+) -> Pattern:
+    """The pattern of a chain, its front towards the viewer, counterclockwise.
+
+    The outline runs along the first ruling, up the top edges, back along the last ruling and
+    down the base edges. The area is the surface's own (quadrature of q + v a), the box is found
+    to rounding. Reference lines: joints (rulings where smooth, bends where creased) and certified
+    rulings about every 15 degrees.
+    """
+    pairs = list(zip(chain.patches, developments, strict=True))
+    first, last = pairs[0], pairs[-1]
+    edges = [
+        _ruling_edge("start", *first, first[0].domain[0], upwards=True),
+        *(_rail_edge("top", *pair) for pair in pairs),
+        _ruling_edge("end", *last, last[0].domain[1], upwards=False),
+        *(_rail_edge("base", *pair) for pair in reversed(pairs)),
+    ]
+    corners = np.concatenate([e.curve(e.u)[0] for e in edges])
+    size = float(np.linalg.norm(np.ptp(corners, axis=0)))
+    outline = tuple(e for e in edges if _length_bound(e) > COLLAPSED * size)
+    area = sum(surface_area(p) for p in chain.patches)
+    lines = (*_joints(chain, pairs), *_references(pairs, rulings))
+    return Pattern(outline, lines, area, _box(outline))
+
+
+def surface_area(patch: Patch) -> float:
+    """The area of a patch in mm2: the integral of q (v1 - v0) + a (v1^2 - v0^2) / 2."""
+
+    def density(t: Array) -> Array:
+        f = patch.frame(t)
+        value = f.q * (f.v_to - f.v_from) + 0.5 * f.a * (f.v_to**2 - f.v_from**2)
+        return value[:, None]
+
+    integral = chebyshev.resolve(density, patch.segments).antiderivative()
+    return float(integral(np.array(patch.domain))[1, 0])
+
+
+def perimeter(outline: tuple[Edge, ...]) -> float:
+    """The length of an outline in mm."""
+    return float(sum(abs(_integral(e, _speed)) for e in outline))
+
+
+def enclosed_area(outline: tuple[Edge, ...]) -> float:
+    """The area inside an outline by Green's formula, mm2, positive counterclockwise."""
+    return float(sum(_integral(e, _moment) for e in outline))
+
+
+def _speed(_point: Array, slope: Array) -> Array:
+    return np.asarray(np.hypot(slope[:, 0], slope[:, 1]))
+
+
+def _moment(point: Array, slope: Array) -> Array:
+    return np.asarray(0.5 * (point[:, 0] * slope[:, 1] - point[:, 1] * slope[:, 0]))
+
+
+def _integral(edge: Edge, density: PlaneDensity) -> float:
+    """The integral of a density along an edge in the direction of its run."""
+    knots = np.sort(edge.u)
+    points, slopes = edge.curve(np.linspace(knots[0], knots[-1], 9))
+    # the moment of a line through the origin is rounding: it is nothing beside these sizes
+    scale = float(np.abs(slopes).max() * max(np.abs(points).max(), 1.0 if slopes.any() else 0.0))
+    series = chebyshev.resolve(
+        lambda u: density(*edge.curve(u))[:, None], knots, scale=1e-3 * scale
+    )
+    value = float(series.antiderivative()(knots[-1:])[0, 0])
+    return value if edge.u[-1] > edge.u[0] else -value
+
+
+def _rail_edge(name: str, patch: Patch, development: Development) -> Edge:
+    """The image of the extent's end: t increases along the top and decreases along the base."""
+    top = name == "top"
+
+    def curve(t: Array) -> tuple[Array, Array]:
+        f = patch.frame(t)
+        jet = patch.jet(t, 1)
+        v, slope = (jet.v_to if top else jet.v_from)[:2]
+        e = development.direction(t)
+        m = np.column_stack([-e[:, 1], e[:, 0]])
+        tangent = (f.p + slope)[:, None] * e + (f.q + v * f.a)[:, None] * m
+        return development.points(t, v), tangent
+
+    return Edge(name, curve, patch.segments if top else patch.segments[::-1].copy())
+
+
+def _ruling_edge(
+    name: str, patch: Patch, development: Development, t: float, *, upwards: bool
+) -> Edge:
+    """The image of one ruling, u = v."""
+    at = np.array([t])
+    jet = patch.jet(at, 0)
+    origin, direction = development.origin(at)[0], development.direction(at)[0]
+    ends = np.array([jet.v_from[0, 0], jet.v_to[0, 0]])
+
+    def curve(v: Array) -> tuple[Array, Array]:
+        return origin + v[:, None] * direction, np.broadcast_to(direction, (len(v), 2))
+
+    return Edge(name, curve, ends if upwards else ends[::-1].copy())
+
+
+def _length_bound(edge: Edge) -> float:
+    """The length of a coarse polygon on an edge: zero where the edge is a point."""
+    u = np.linspace(edge.u[0], edge.u[-1], 9)
+    return float(np.linalg.norm(np.diff(edge.curve(u)[0], axis=0), axis=1).sum())
+
+
+def _ruling_line(layer: str, patch: Patch, dev: Development, t: float, angle: float) -> Line:
+    at = np.array([t])
+    jet = patch.jet(at, 0)
+    return Line(layer, dev.points(at, jet.v_from[0])[0], dev.points(at, jet.v_to[0])[0], angle)
+
+
+def _joints(chain: Chain, pairs: list[tuple[Patch, Development]]) -> list[Line]:
+    """The joints between patches as lines: rulings where smooth, else bends up or down."""
+    out = []
+    for (patch, development), joint in zip(pairs[1:], chain.joints, strict=True):
+        bend = "BEND_UP" if joint.angle > 0.0 else "BEND_DOWN"
+        layer, angle = ("RULING", 0.0) if joint.smooth else (bend, joint.angle)
+        out.append(_ruling_line(layer, patch, development, patch.domain[0], angle))
+    return out
+
+
+def _references(pairs: list[tuple[Patch, Development]], rulings: tuple[Array, ...]) -> list[Line]:
+    """Certified rulings to bend along, one for every 15 degrees of bending or turning."""
+    out = []
+    for (patch, development), t in zip(pairs, rulings, strict=True):
+        if len(t) < 3:
+            continue
+        f = patch.frame(0.5 * (t[1:] + t[:-1]))
+        if np.abs(f.c * np.diff(t)).sum() <= COLLAPSED:
+            continue  # a plane has no rulings to bend along
+        turned = np.cumsum(np.hypot(f.a, f.c) * np.diff(t))[:-1]
+        step = np.floor(turned / LINE_EVERY + 0.5)
+        picked = np.flatnonzero(np.diff(step, prepend=0.0) > 0.0)
+        out += [_ruling_line("RULING", patch, development, float(t[i + 1]), 0.0) for i in picked]
+    return out
+
+
+def _box(outline: tuple[Edge, ...]) -> tuple[float, float, float, float]:
+    """The exact bounding box: the extremes of every edge, refined."""
+    low, high = np.full(2, np.inf), np.full(2, -np.inf)
+    for edge in outline:
+        knots = np.sort(edge.u)
+        u = np.unique(np.concatenate([np.linspace(a, b, 65) for a, b in itertools.pairwise(knots)]))
+        points = edge.curve(u)[0]
+        for axis in (0, 1):
+            for sign, best in ((1.0, high), (-1.0, low)):
+                value = sign * _refined(edge.curve, u, points, axis, sign)
+                best[axis] = max(best[axis], value) if sign > 0 else min(best[axis], value)
+    return float(low[0]), float(low[1]), float(high[0]), float(high[1])
+
+
+def _refined(curve: PlaneCurve, u: Array, points: Array, axis: int, sign: float) -> float:
+    """The largest sign * coordinate near the best sample, by repeated division."""
+    values = sign * points[:, axis]
+    best_value = -np.inf
+    for _ in range(6):
+        best = int(np.argmax(values))
+        best_value = max(best_value, float(values[best]))
+        u = np.linspace(u[max(best - 1, 0)], u[min(best + 1, len(u) - 1)], 17)
+        values = sign * curve(u)[0][:, axis]
+    return max(best_value, float(values.max()))

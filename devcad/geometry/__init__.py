@@ -1,0 +1,1 @@
+"""The geometry core: numbers in, values out; knows no file and no format."""

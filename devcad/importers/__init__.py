@@ -1,0 +1,1 @@
+"""Importers: one file per kind of input. They read within limits and give plain values."""

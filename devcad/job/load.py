@@ -1,0 +1,248 @@
+"""A job file to a frozen Job: every length in mm, every angle in radians, all paths checked."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+from pydantic import BaseModel, ValidationError
+
+from devcad.errors import DevcadError, JobError
+from devcad.geometry.constructions import SURFACES
+from devcad.geometry.constructions.base import Surface
+from devcad.geometry.taylor import Array
+from devcad.importers.files import decode, inside, read_bytes
+from devcad.importers.table import parse_points
+from devcad.importers.toml import parse_toml
+from devcad.job.invalid import below, problems, raise_all, shown, unknown_kind
+from devcad.job.recipe import RecipeTable
+from devcad.job.tables import JobTable, PlaceTable
+from devcad.units import MM_PER_UNIT
+
+MAX_JOB_BYTES = 256_000
+MAX_POINTS_BYTES = 4_000_000  # 100 000 points with 12 digits each
+DEFAULT_TOLERANCE = 0.05  # mm
+PARALLEL = 1e-9  # sine of the angle below which two directions are one
+LARGEST = 1e12  # in any unit; cubes of it times 1e9 still are finite and exact enough
+
+M = TypeVar("M", bound=BaseModel)
+
+
+@dataclass(frozen=True, slots=True)
+class Meta:
+    """What the drawing and the cut list say; ``grain`` in radians from +x in the pattern."""
+
+    part_number: str = ""
+    revision: str = ""
+    description: str = ""
+    quantity: int = 1
+    grain: float | None = None
+    finish: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class JobPanel:
+    """A surface of the job, still in the job's units, with its name and its place (4, 4) in mm."""
+
+    name: str
+    surface: Surface
+    place: Array | None
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """A job file, checked. Lengths are mm; only the surfaces wait for ``mm_per_unit``.
+
+    ``single`` says that it has [surface] and not [[panel]]; ``path`` is as the user gave it; ``sha256`` is that of the job file's bytes followed by those
+    of the files it names, in their order. ``pipeline`` None leaves the choice to the caller.
+    """
+
+    name: str
+    path: str
+    sha256: str
+    mm_per_unit: float
+    tolerance: float
+    thickness: float
+    reference: str
+    material: str | None
+    pipeline: str | None
+    bend: float
+    meta: Meta
+    recipe: RecipeTable
+    single: bool
+    panels: tuple[JobPanel, ...]
+
+
+def load(path: str | Path) -> Job:
+    """Read and check a job file.
+
+    Raises:
+        JobError: syntax, an unknown or missing key, a value outside its domain, a file outside
+        the job's folder; LimitError: too large or too deep; FileError: missing, unreadable, not
+        UTF-8. Several problems come as one InvalidJob.
+    """
+    place = str(path)
+    data = read_bytes(Path(path), limit=MAX_JOB_BYTES, place=place)
+    tree = parse_toml(decode(data, place=place), place=place)
+    digest = hashlib.sha256(data)
+    for table, where in _file_tables(tree, place):
+        digest.update(_inline_points(table, Path(path).parent, where))
+    return _job(tree, place, digest.hexdigest())
+
+
+def _file_tables(node: Any, place: str) -> Iterator[tuple[dict[str, Any], str]]:
+    """The tables of kind points that name a file, with their places, in the file's order."""
+    if isinstance(node, dict):
+        if node.get("kind") == "points" and isinstance(node.get("file"), str):
+            yield node, place
+        for key, value in node.items():
+            yield from _file_tables(value, below(place, key))
+    elif isinstance(node, list):
+        for k, value in enumerate(node):
+            if isinstance(value, dict | list):
+                yield from _file_tables(value, f"{place}[{k}]")
+
+
+def _inline_points(table: dict[str, Any], folder: Path, place: str) -> bytes:
+    """Replace the key ``file`` by the points in it; returns the file's bytes."""
+    if "points" in table:
+        raise JobError(
+            "there are both points and file",
+            place=place,
+            value="file",
+            limit="one of the two",
+            remedy="remove one of them",
+        )
+    name = table["file"]
+    path = inside(folder, name, place=f"{place}.file")
+    where = f"{place}.file > {name}"
+    data = read_bytes(path, limit=MAX_POINTS_BYTES, place=where)
+    table["points"] = parse_points(decode(data, place=where), place=where)
+    del table["file"]
+    return data
+
+
+def _job(tree: dict[str, Any], place: str, sha256: str) -> Job:
+    """The Job of a tree; all its problems at once."""
+    raise_all(_too_large(tree, place))
+    table, found = _validated(JobTable, tree, place, {})
+    scale = MM_PER_UNIT.get(str(tree.get("units", "mm")), 1.0)
+    surfaces: list[Surface] = []
+    for inner, where in _surface_tables(tree, place):
+        surface, wrong = _surface(inner, where, scale)
+        found += wrong
+        surfaces += [surface] if surface is not None else []
+    raise_all(sorted(found, key=lambda error: -error.code))  # a limit tells more than a typo
+    assert table is not None  # raise_all spoke otherwise
+    names = [panel.name for panel in table.panel or ()] or [table.name]
+    places = [panel.place for panel in table.panel or ()] or [table.place]
+    meta = table.meta.model_dump()
+    if table.meta.grain is not None:
+        meta["grain"] = math.radians(table.meta.grain)
+    return Job(
+        name=table.name,
+        path=place,
+        sha256=sha256,
+        mm_per_unit=scale,
+        tolerance=DEFAULT_TOLERANCE if table.tolerance is None else table.tolerance * scale,
+        thickness=table.thickness * scale,
+        reference=table.reference,
+        material=table.material,
+        pipeline=table.pipeline,
+        bend=table.bend,
+        meta=Meta(**meta),
+        recipe=table.recipe,
+        single=table.surface is not None,
+        panels=tuple(
+            JobPanel(name, surface, _matrix(where, scale, place))
+            for name, surface, where in zip(names, surfaces, places, strict=True)
+        ),
+    )
+
+
+def _too_large(node: Any, place: str) -> list[DevcadError]:
+    """One error for each finite number that no part has."""
+    if isinstance(node, dict):
+        return [e for key, value in node.items() for e in _too_large(value, below(place, key))]
+    if isinstance(node, list):
+        return [e for k, value in enumerate(node) for e in _too_large(value, f"{place}[{k}]")]
+    if type(node) not in (int, float) or not LARGEST < abs(node) < math.inf:
+        return []
+    what = f"{shown(node)} is larger than any part: at most {LARGEST:g}"
+    remedy = "give a smaller number, in larger units"
+    return [JobError(what, place, "", shown(node), LARGEST, remedy)]
+
+
+def _surface_tables(tree: dict[str, Any], place: str) -> Iterator[tuple[Any, str]]:
+    """Table and place of every surface that the tree has where one belongs."""
+    if isinstance(tree.get("surface"), dict):
+        yield tree["surface"], f"{place} > surface"
+    panels = tree.get("panel")
+    for k, panel in enumerate(panels if isinstance(panels, list) else ()):
+        if isinstance(panel, dict) and isinstance(panel.get("surface"), dict):
+            yield panel["surface"], f"{place} > panel {panel.get('name', k)} > surface"
+
+
+def _surface(
+    tree: dict[str, Any], place: str, scale: float
+) -> tuple[Surface | None, list[DevcadError]]:
+    """The model of a surface, chosen by its kind, or its problems."""
+    kind = tree.get("kind")
+    if kind is None:
+        error = JobError(
+            "the key is missing",
+            place=f"{place}.kind",
+            value="",
+            limit=", ".join(sorted(SURFACES)),
+            remedy='add kind = "..."; devcad list surfaces names them',
+        )
+        return None, [error]
+    if not isinstance(kind, str) or kind not in SURFACES:
+        return None, [unknown_kind(str(kind), SURFACES, place=f"{place}.kind")]
+    return _validated(SURFACES[kind], tree, place, {"mm_per_unit": scale})
+
+
+def _validated(
+    model: type[M], tree: Mapping[str, Any], place: str, context: dict[str, Any]
+) -> tuple[M | None, list[DevcadError]]:
+    """The model of a tree, or its problems."""
+    try:
+        return model.model_validate(tree, context=context), []
+    except ValidationError as error:
+        return None, problems(error, tree, model, place=place)
+
+
+def _matrix(table: PlaceTable | None, scale: float, place: str) -> Array | None:
+    """The rigid motion (4, 4) in mm of a place: columns are the images of x, y, z and 0."""
+    if table is None:
+        return None
+    z = np.array(table.z_axis) / np.linalg.norm(table.z_axis)
+    wanted = table.x_axis if table.x_axis is not None else (1.0, 0.0, 0.0)
+    x = _across(np.array(wanted), z)
+    if x is None and table.x_axis is None:
+        x = _across(np.array([0.0, 1.0, 0.0]), z)
+    if x is None:
+        raise JobError(
+            "x_axis runs along z_axis",
+            place=f"{place} > place.x_axis",
+            value=0.0,
+            limit=PARALLEL,
+            remedy="give a direction across z_axis",
+        )
+    matrix = np.eye(4)
+    matrix[:3, :3] = np.column_stack([x, np.cross(z, x), z])
+    matrix[:3, 3] = scale * np.array(table.origin)
+    return matrix
+
+
+def _across(direction: Array, axis: Array) -> Array | None:
+    """The unit part of a direction across a unit axis, None where there is none."""
+    direction = direction / np.linalg.norm(direction)
+    rest = direction - (direction @ axis) * axis
+    length = float(np.linalg.norm(rest))
+    return None if length <= PARALLEL else rest / length

@@ -1,0 +1,165 @@
+"""Recipes: how a part is written. Data in ``pipelines/*.toml``, overridden by jobs and by hand.
+
+A recipe's lengths are millimetres. Precedence, key by key: command line, job, recipe, default.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
+
+from devcad.checks import CHECKS
+from devcad.errors import JobError
+from devcad.export import FORMATS, Options
+from devcad.importers.files import decode, read_bytes
+from devcad.importers.toml import parse_toml
+from devcad.job.invalid import did_you_mean, problems, raise_all
+
+DEFAULT = "cad"
+MAX_BYTES = 256_000
+
+
+def known_formats(names: list[str]) -> list[str]:
+    """The names, each once and in the order given; JobError where one is no format."""
+    return _known(names, FORMATS, "format")
+
+
+def known_checks(names: list[str]) -> list[str]:
+    """The names, each once and in the order given; JobError where one is no check."""
+    return _known(names, CHECKS, "check")
+
+
+def _known(names: list[str], known: Iterable[str], noun: str) -> list[str]:
+    for name in names:
+        if name not in known:
+            raise JobError(
+                f'this version knows no {noun} "{name[:60]}"',
+                value=name[:60],
+                limit=", ".join(known),
+                remedy=did_you_mean(name, known),
+            )
+    return list(dict.fromkeys(names))
+
+
+class _Table(BaseModel):
+    model_config = ConfigDict(
+        extra="forbid", frozen=True, strict=True, allow_inf_nan=False, validate_by_name=False
+    )
+
+
+class StepTable(_Table):
+    """How STEP files are written; ``tolerance`` in mm."""
+
+    tolerance: Annotated[float, Field(gt=0.0)] | None = None
+    degree: Literal[3, 5] | None = None
+    schema_: Literal["AP214", "AP242"] | None = Field(None, alias="schema")
+
+
+class DxfTable(_Table):
+    """How cut patterns are written."""
+
+    version: Literal["R2000", "R2010"] | None = None
+    profile: Literal["generic"] | None = None
+    curves: Literal["arcs", "polyline", "spline"] | None = None
+
+
+class RecipeTable(_Table):
+    """The keys of a recipe; a key that is absent leaves the next source its say."""
+
+    formats: Annotated[list[str], Field(min_length=1), AfterValidator(known_formats)] | None = None
+    step: StepTable = StepTable()
+    dxf: DxfTable = DxfTable()
+    allow: Annotated[list[str], AfterValidator(known_checks)] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Recipe:
+    """What an export does: the formats in order, the exporters' options in mm, and the checks
+    that may fail."""
+
+    formats: tuple[str, ...]
+    options: Options
+    allow: frozenset[str]
+
+
+def resolve(
+    name: str | None,
+    override: RecipeTable,
+    *,
+    formats: Iterable[str] = (),
+    allow: Iterable[str] = (),
+) -> Recipe:
+    """The recipe ``name`` (default cad) with the job's override and the caller's words on top.
+
+    ``formats`` replace the recipe's, ``allow`` is added to it.
+
+    Raises:
+        JobError: no such recipe, format or check, or a recipe file that is wrong.
+    """
+    keys = {**_flat(_read(name or DEFAULT)), **_flat(override)}
+    chosen = known_formats(list(formats)) or keys.pop("formats", list(FORMATS))
+    keys.pop("formats", None)
+    allowed = {*known_checks(list(allow)), *keys.pop("allow", ())}
+    return Recipe(tuple(chosen), Options(**keys), frozenset(allowed))
+
+
+def recipe_names() -> dict[str, str]:
+    """The recipes there are, with the first sentence of each file."""
+    files = sorted(path for path in _folder().iterdir() if path.suffix == ".toml")
+    return {path.stem: _first_sentence(path) for path in files}
+
+
+def _read(name: str) -> RecipeTable:
+    """The keys of a recipe file."""
+    folder = _folder()
+    names = [path.stem for path in folder.iterdir() if path.suffix == ".toml"]
+    if name not in names:
+        raise JobError(
+            f'there is no pipeline "{name[:60]}"',
+            value=name[:60],
+            limit=", ".join(sorted(names)),
+            remedy=did_you_mean(name, names),
+        )
+    place = f"{name}.toml"
+    data = read_bytes(folder / place, limit=MAX_BYTES, place=place)
+    tree = parse_toml(decode(data, place=place), place=place)
+    try:
+        return RecipeTable.model_validate(tree)
+    except ValidationError as error:
+        raise_all(problems(error, tree, RecipeTable, place=place))
+        raise
+
+
+def _folder() -> Path:
+    """Where the recipes lie: in the wheel inside the package, in a checkout beside it."""
+    package = Path(str(resources.files("devcad")))
+    inside = package / "_recipes"
+    return inside if inside.is_dir() else package.parent / "pipelines"
+
+
+def _flat(table: RecipeTable) -> dict[str, Any]:
+    """The keys that are given, as the exporters' options name them."""
+    keys = table.model_dump(exclude_none=True, by_alias=True)
+    step, dxf = keys.pop("step"), keys.pop("dxf")
+    return {
+        **keys,
+        **{f"step_{key}": value for key, value in step.items()},
+        **{f"dxf_{key}": value for key, value in dxf.items()},
+    }
+
+
+def _first_sentence(path: Path) -> str:
+    """The comment that opens a recipe file, to its first full stop or colon."""
+    lines = path.read_text(encoding="utf-8").splitlines()
+    comment = " ".join(line.lstrip("# ") for line in lines[: _first_key(lines)])
+    return comment.split(". ")[0].split(": ")[0].strip()
+
+
+def _first_key(lines: list[str]) -> int:
+    """The number of comment lines at the top."""
+    return next((k for k, line in enumerate(lines) if not line.startswith("#")), len(lines))

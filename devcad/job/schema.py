@@ -1,0 +1,27 @@
+"""The JSON Schema of the job file, for editors."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from pydantic import Field, create_model
+
+from devcad.geometry.constructions import SurfaceSpec
+from devcad.job.tables import JobTable, PanelTable
+
+
+def job_schema() -> dict[str, Any]:
+    """The schema of a job file (JSON Schema 2020-12): every key, kind and range.
+
+    Conditions between keys (either [surface] or [[panel]], names that differ) are not in it.
+    """
+    panel = create_model("PanelTable", __base__=PanelTable, surface=(SurfaceSpec, ...))
+    panels = Annotated[list[panel], Field(min_length=1)] | None  # type: ignore[valid-type]
+    job = create_model(
+        "JobTable", __base__=JobTable, surface=(SurfaceSpec | None, None), panel=(panels, None)
+    )
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "devcad job file",
+        **{key: value for key, value in job.model_json_schema().items() if key != "title"},
+    }

@@ -1,0 +1,1 @@
+"""Meshing: triangles along the rulings, open sheets and watertight solids."""

@@ -1,0 +1,148 @@
+"""The spine: a job becomes a part, a part becomes files in a folder that appears at once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from devcad.assemble import PanelSpec, assemble
+from devcad.checks import require
+from devcad.errors import DevcadError
+from devcad.export import Options, Written, writer
+from devcad.export.folder import published
+from devcad.job.load import Job, JobPanel, load
+from devcad.job.recipe import Recipe, known_checks, known_formats, resolve
+from devcad.part import Part
+from devcad.report import SvgOrigin, make_report, to_bytes
+
+Progress = Callable[[str], None]
+"""Told what begins now."""
+
+DEFAULT_FORMATS = ("step", "stl", "glb", "dxf", "svg")
+
+
+def _silent(_: str) -> None:
+    """No progress is shown."""
+
+
+def plan(
+    job: Job,
+    *,
+    pipeline: str | None = None,
+    formats: Iterable[str] = (),
+    allow: Iterable[str] = (),
+) -> Recipe:
+    """The recipe that applies to a job: the caller's words, then the job's, then the recipe's.
+
+    Raises:
+        JobError: no such recipe, format or check.
+    """
+    try:
+        return resolve(pipeline or job.pipeline, job.recipe, formats=formats, allow=allow)
+    except DevcadError as error:
+        raise error.at(place="" if pipeline else f"{job.path} > pipeline") from None
+
+
+def build(
+    job: Job | str | Path,
+    *,
+    pipeline: str | None = None,
+    allow: Iterable[str] = (),
+    progress: Progress = _silent,
+) -> Part:
+    """The part that a job, or a job file, describes: surfaces, meshes, patterns and checks.
+
+    ``allow`` names checks that may fail, beside those that the recipe allows.
+
+    Raises:
+        JobError, LimitError, FileError: as ``load``; GeometryError: no such developable;
+        CheckFailed: a check fails that is not allowed.
+    """
+    job = job if isinstance(job, Job) else load(job)
+    recipe = plan(job, pipeline=pipeline, allow=allow)
+    progress(f"{job.name}: geometry")
+    try:
+        specs = [spec for panel in job.panels for spec in _specs(panel, job)]
+        part = assemble(
+            job.name,
+            specs,
+            thickness=job.thickness,
+            reference=job.reference,
+            tolerance=job.tolerance,
+            bend=job.bend,
+            allow=recipe.allow,
+        )
+    except DevcadError as error:
+        raise error.at(place=job.path) from None
+    return replace(
+        part,
+        job_sha256=job.sha256,
+        part_number=job.meta.part_number,
+        description=job.meta.description,
+    )
+
+
+def export(
+    part: Part,
+    out: str | Path,
+    *,
+    formats: Sequence[str] = DEFAULT_FORMATS,
+    options: Options | None = None,
+    allow: Iterable[str] = (),
+    progress: Progress = _silent,
+) -> dict[str, Any]:
+    """Write OUT/<part>/ with the given formats and report.json; returns the report.
+
+    All files appear together, in place of those of an earlier export, or none does. ``allow`` is
+    for the checks on what was written; what the build allowed stays allowed.
+
+    Raises:
+        JobError: an unknown format or check; CheckFailed: a check fails that is not allowed;
+        FileError: the folder cannot be written.
+    """
+    chosen = known_formats(list(formats))
+    was_allowed = {check.name for check in part.checks if not check.passed}
+    allowed = frozenset(was_allowed.union(known_checks(list(allow))))
+    with published(Path(out), part.name) as folder:
+        written: list[Written] = []
+        for name in chosen:
+            progress(f"{part.name}: {name}")
+            written += writer(name)(part, folder, options or Options())
+        checks = [*part.checks, *(check for file in written for check in file.checks)]
+        require(checks, allowed)
+        origin = _svg_origin(part) if "svg" in chosen else None
+        report = make_report(part, checks=checks, files=written, svg_origin=origin)
+        (folder / "report.json").write_bytes(to_bytes(report))
+    return report
+
+
+def _specs(panel: JobPanel, job: Job) -> list[PanelSpec]:
+    """The panels of a surface: one of the job's name for it, or several, numbered from 1."""
+    where = f"{job.path} > " if job.single else f"{job.path} > panel {panel.name} > "
+    try:
+        built = panel.surface.build()
+    except DevcadError as error:
+        raise error.at(place=f"{where}surface") from None
+    several = len(built.panels) > 1
+    stem = "" if job.single else f"{panel.name}-"
+    return [
+        PanelSpec(
+            name=f"{stem}{k}" if several else panel.name,
+            kind=panel.surface.kind,
+            patches=patches,
+            base_closed=built.base_closed,
+            mm_per_unit=job.mm_per_unit,
+            cut=getattr(panel.surface, "cut", None),
+            gap=getattr(panel.surface, "gap", 0.0) * job.mm_per_unit,
+            place=panel.place,
+        )
+        for k, patches in enumerate(built.panels, start=1)
+    ]
+
+
+def _svg_origin(part: Part) -> SvgOrigin:
+    from devcad.export.svg import svg_origin
+
+    return {panel.name: svg_origin(panel) for panel in part.panels}

@@ -1,0 +1,190 @@
+"""The geometric checks of a panel: what its surface and its pattern prove (design.md, 7)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from devcad.checks import Check, Where, at_most
+from devcad.flatten.development import Development
+from devcad.flatten.outline import surface_area
+from devcad.flatten.verify import fold_back, isometry, overlap_area
+from devcad.geometry.chain import Chain
+from devcad.geometry.classify import EXACT
+from devcad.geometry.patch import Patch
+from devcad.geometry.regularity import Extreme, clearance, smallest_radius, twist
+from devcad.mesh.build import volume
+from devcad.part import Panel
+
+TWIST_LIMIT_DEG = 0.01
+ISOMETRY_LIMIT = 1e-9
+FOLD_BACK_LIMIT = 1e-8  # 1e-6 mm on 100 mm
+OVERLAP_LIMIT = 1e-9
+
+
+def prove_surface(
+    name: str, chain: Chain, layers: tuple[float, ...], *, reaches_apex: bool
+) -> list[Check]:
+    """The checks ``twist`` and ``regular`` of a chain, from c0 and e before anything else."""
+    return [_twist(name, chain), _regular(name, chain, layers, reaches_apex=reaches_apex)]
+
+
+def prove_pattern(
+    panel: Panel,
+    middle: Chain,
+    developments: tuple[Development, ...],
+    *,
+    tolerance: float,
+    smallest_bend: float | None,
+) -> list[Check]:
+    """The checks isometry, mesh-deviation, fold-back, overlap, and bend-radius where known."""
+    pairs = list(zip(middle.patches, developments, strict=True))
+    patch, worst = _worst((p, isometry(p, d)) for p, d in pairs)
+    checks = [
+        at_most(
+            "isometry",
+            panel.name,
+            worst.value,
+            ISOMETRY_LIMIT,
+            "",
+            where=_where(patch, worst),
+            says=f"the pattern's metric differs by {worst.value:.3g} at t = {worst.t:.6g}",
+            remedy="the curve may be rougher than its pieces say; give it as points or a chain",
+        ),
+        _mesh_deviation(panel, tolerance),
+        _fold_back(panel.name, middle, developments),
+        _overlap(panel),
+    ]
+    if smallest_bend is not None and panel.thickness:
+        checks.append(_bend_radius(panel.name, middle, panel.thickness, smallest_bend))
+    return checks
+
+
+def _twist(name: str, chain: Chain) -> Check:
+    patch, worst = _worst((p, twist(p)) for p in chain.patches)
+    degrees = float(np.degrees(worst.value))
+    return at_most(
+        "twist",
+        name,
+        degrees if np.isfinite(degrees) else float("inf"),
+        TWIST_LIMIT_DEG,
+        "deg",
+        where=_where(patch, worst),
+        says=f"not developable at t = {worst.t:.6g}: the tangent plane turns {degrees:.4g} deg "
+        "along the ruling",
+        remedy="choose rulings along which both boundary tangents and the ruling lie in one plane",
+    )
+
+
+def _regular(name: str, chain: Chain, layers: tuple[float, ...], *, reaches_apex: bool) -> Check:
+    stands = [(p, clearance(p, layers, to_apex=reaches_apex)) for p in chain.patches]
+    patch, worst = min(stands, key=lambda pair: pair[1].value)
+    thick = layers != (0.0,)
+    passed = worst.value > 0.0 or (worst.touches and not thick)
+    crossing = "crosses" if worst.value < 0.0 else "lies on"
+    layer = "a skin of the sheet" if thick else "the extent"
+    says = (
+        f"{layer} {crossing} the regression curve at t = {worst.t:.6g}: "
+        f"{worst.value:.4g} mm along the ruling"
+    )
+    if worst.value == 0.0 and not worst.touches:
+        says = f"the ruling at t = {worst.t:.6g} is singular all along: the front turns over there"
+    return Check(
+        "regular",
+        name,
+        worst.value,
+        0.0,
+        "mm",
+        passed,
+        _where(patch, Extreme(worst.value, worst.t, worst.v)),
+        says,
+        _regular_remedy(patch, worst.t, thick=thick),
+    )
+
+
+def _regular_remedy(patch: Patch, t: float, *, thick: bool) -> str:
+    """Where the regression curve lies, as a limit for the extent."""
+    frame = patch.frame([t])
+    a, q = float(frame.a[0]), float(frame.q[0])
+    if not np.isfinite(a) or abs(a) <= 1e-14 * abs(q) or (a == 0.0 and q == 0.0):
+        return "bend less sharply, or use a thinner sheet" if thick else "split the curve there"
+    thinner = ", or use a thinner sheet" if thick else ""
+    size = abs(float(frame.v_from[0])) + abs(float(frame.v_to[0]))
+    edge = -q / a if abs(q / a) > EXACT * size else 0.0
+    return f"keep the extent on one side of v = {edge:.6g} mm there{thinner}"
+
+
+def _mesh_deviation(panel: Panel, tolerance: float) -> Check:
+    return at_most(
+        "mesh-deviation",
+        panel.name,
+        panel.mesh.deviation,
+        tolerance,
+        "mm",
+        says=f"the triangles are {panel.mesh.deviation:.4g} mm from the surface",
+        remedy="raise the tolerance",
+    )
+
+
+def _fold_back(name: str, middle: Chain, developments: tuple[Development, ...]) -> Check:
+    worst, size = fold_back(middle, developments)
+    return at_most(
+        "fold-back",
+        name,
+        worst.value,
+        FOLD_BACK_LIMIT * size,
+        "mm",
+        where=Where(worst.t, worst.v),
+        says=f"the pattern folded up again misses the surface by {worst.value:.3g} mm "
+        f"at t = {worst.t:.6g}",
+        remedy="the surface bends too suddenly there; smooth or split its curve",
+    )
+
+
+def _overlap(panel: Panel) -> Check:
+    area = overlap_area(panel.pattern)
+    half = 0.5 * (panel.chain.patches[0].domain[0] + panel.chain.patches[-1].domain[1])
+    return at_most(
+        "overlap",
+        panel.name,
+        area,
+        OVERLAP_LIMIT * panel.pattern.area,
+        "mm2",
+        says=f"the pattern covers {area:.4g} mm2 twice",
+        remedy=f"split the panel in two, for instance at t = {half:.6g}",
+    )
+
+
+def _bend_radius(name: str, middle: Chain, thickness: float, limit: float) -> Check:
+    patch, tightest = min(
+        ((p, smallest_radius(p)) for p in middle.patches), key=lambda pair: pair[1].value
+    )
+    inside = tightest.value - 0.5 * thickness
+    return Check(
+        "bend-radius",
+        name,
+        inside,
+        limit,
+        "mm",
+        inside >= limit,
+        _where(patch, tightest),
+        f"the inside radius is {inside:.4g} mm at t = {tightest.t:.6g}",
+        "use a thinner or softer sheet, or a larger radius",
+    )
+
+
+def mesh_volume(panel: Panel, tolerance: float) -> Check:
+    """The check ``volume`` of a mesh: against area x thickness, within area x tolerance."""
+    area = sum(surface_area(patch) for patch in panel.chain.patches)
+    value = abs(volume(panel.mesh) - area * panel.thickness)
+    return at_most(
+        "volume", panel.name, value, area * tolerance, "mm3", says=f"the mesh is off by {value:.4g}"
+    )
+
+
+def _worst(pairs: object) -> tuple[Patch, Extreme]:
+    return max(pairs, key=lambda pair: np.nan_to_num(pair[1].value, nan=np.inf))  # type: ignore
+
+
+def _where(patch: Patch, place: Extreme) -> Where:
+    x, y, z = (float(c) for c in patch.point([place.t], [place.v])[0])
+    return Where(place.t, place.v, (x, y, z))

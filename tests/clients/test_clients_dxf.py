@@ -1,0 +1,119 @@
+"""DXF patterns as a shop's programs see them: one closed contour of the reported size."""
+
+from __future__ import annotations
+
+from collections import Counter
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import ezdxf
+import ezdxf.path
+import numpy as np
+import pytest
+from exported import Exported, Look
+from numpy.typing import NDArray
+
+pytestmark = pytest.mark.clients
+
+COLOURS = {
+    "CUT_OUTER": 7,
+    "CUT_INNER": 1,
+    "BEND_UP": 3,
+    "BEND_DOWN": 5,
+    "RULING": 9,
+    "ENGRAVE": 6,
+    "MARK": 2,
+    "SCORE": 4,
+}
+MILLIMETRES = 4  # $INSUNITS
+
+
+def test_a_shop_finds_one_closed_contour_and_nothing_odd(exported: Exported) -> None:
+    for path in exported.files("dxf"):
+        drawing = ezdxf.readfile(path)
+        assert not drawing.audit().has_errors
+        assert drawing.header["$INSUNITS"] == MILLIMETRES
+        model = list(drawing.modelspace())
+        outer = [entity for entity in model if entity.dxf.layer == "CUT_OUTER"]
+        assert [entity.dxftype() for entity in outer] == ["LWPOLYLINE"]
+        assert outer[0].closed
+        assert {e.dxftype() for e in model} <= {"LWPOLYLINE", "LINE", "CIRCLE", "ARC"}
+        assert {e.dxf.layer: e.dxf.color for e in model}.items() <= COLOURS.items()
+        repeated = [key for key, times in Counter(map(_key, model)).items() if times > 1]
+        assert not repeated
+
+
+def test_the_contour_is_counterclockwise_without_tiny_segments(exported: Exported) -> None:
+    for path in exported.files("dxf"):
+        points = _contour(path)
+        x, y = points.T
+        assert np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)) > 0.0
+        corners = np.array([(v[0], v[1]) for v in _outer(path).get_points("xy")])
+        assert np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1).min() > 1e-4  # mm
+
+
+def test_the_contour_encloses_the_reported_flat_area(exported: Exported) -> None:
+    """A contour within d of the true one encloses its area to d times its length."""
+    for path, panel in zip(exported.files("dxf"), exported.panels, strict=True):
+        x, y = _contour(path).T
+        area = 0.5 * np.sum(x * np.roll(y, -1) - y * np.roll(x, -1))
+        allowed = (exported.deviation("dxf") + FLATTENED) * panel["cut_length"]
+        assert area == pytest.approx(panel["flat_area"], abs=allowed)
+
+
+def test_the_contour_fills_the_reported_box(exported: Exported) -> None:
+    for path, panel in zip(exported.files("dxf"), exported.panels, strict=True):
+        points = _contour(path)
+        box = [*points.min(axis=0), *points.max(axis=0)]
+        allowed = exported.deviation("dxf") + FLATTENED
+        np.testing.assert_allclose(box, panel["flat_bbox"], rtol=0, atol=allowed)
+
+
+def test_reference_lines_stay_on_the_panel(exported: Exported) -> None:
+    from shapely import LineString, Polygon
+
+    for path in exported.files("dxf"):
+        panel = Polygon(_contour(path)).buffer(exported.deviation("dxf") + 2 * FLATTENED)
+        for entity in ezdxf.readfile(path).modelspace().query("LINE"):
+            line = LineString([tuple(entity.dxf.start)[:2], tuple(entity.dxf.end)[:2]])
+            assert panel.covers(line)
+
+
+def test_quoting_tools_see_a_closed_polyline(exported: Exported, in_node: Look) -> None:
+    for path in exported.files("dxf"):
+        seen = in_node(path)
+        assert seen["units"] == MILLIMETRES
+        assert seen["version"] == "AC1015"
+        outer = [entity for entity in seen["entities"] if entity["layer"] == "CUT_OUTER"]
+        assert [(e["type"], e["closed"]) for e in outer] == [("LWPOLYLINE", True)]
+        assert outer[0]["vertices"] == len(_outer(path))
+
+
+def test_freecad_imports_the_contour_at_true_length(exported: Exported, in_freecad: Look) -> None:
+    for path, panel in zip(exported.files("dxf"), exported.panels, strict=True):
+        layers = in_freecad(path)["layers"]
+        length = sum(
+            layer["length"] for name, layer in layers.items() if name.startswith("CUT_OUTER")
+        )
+        assert length == pytest.approx(panel["cut_length"], rel=1e-5)  # arcs against the true edge
+
+
+FLATTENED = 1e-4  # mm, the sagitta to which arcs are flattened here
+
+
+def _outer(path: Path) -> Any:
+    return ezdxf.readfile(path).modelspace().query('LWPOLYLINE[layer=="CUT_OUTER"]').first
+
+
+def _contour(path: Path) -> NDArray[np.float64]:
+    flat = ezdxf.path.make_path(_outer(path)).flattening(FLATTENED)
+    return np.array([(point.x, point.y) for point in flat])
+
+
+def _key(entity: Any) -> tuple[object, ...]:
+    """Two entities with one key lie on each other."""
+    points = list(ezdxf.path.make_path(entity).flattening(0.05))
+    length = sum((b - a).magnitude for a, b in pairwise(points))
+    ends = sorted((round(p.x, 4), round(p.y, 4)) for p in (points[0], points[-1]))
+    return (entity.dxftype(), *ends, round(length, 3))
