@@ -7,21 +7,6 @@ from dataclasses import dataclass
 
 from devcad.errors import CheckFailed
 
-CHECKS = {
-    "twist": "the tangent plane stays the same along every ruling",
-    "regular": "the surface ends before its regression curve",
-    "isometry": "lengths in the pattern are lengths on the surface",
-    "mesh-deviation": "the mesh lies within the tolerance",
-    "fold-back": "the pattern and its bends rebuild the surface",
-    "overlap": "the pattern does not overlap itself",
-    "bend-radius": "the material takes the smallest radius",
-    "step-deviation": "the STEP file is the surface",
-    "step-twist": "the faces in the STEP file are developable",
-    "volume": "the STEP solid has the volume of the sheet",
-    "dxf-deviation": "the curves in the DXF file are the pattern's",
-}
-"""Every check by name, with what it proves; design.md section 7 has the limits."""
-
 
 @dataclass(frozen=True, slots=True)
 class Where:
@@ -103,7 +88,13 @@ NAMES = (
     "step-valid",
     "dxf-deviation",
     "dxf-readback",
+    "svg-deviation",
+    "svg-readback",
+    "glb-readback",
+    "svg-deviation",
+    "svg-readback",
     "stl-readback",
+    "glb-readback",
     "volume",
 )
 """Every check there is: what --allow accepts."""

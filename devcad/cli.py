@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from devcad.job.load import Job
     from devcad.pipeline import Progress
 
+LISTED = ("surfaces", "curves", "formats", "pipelines", "materials")
 INTERRUPTED = 130  # 128 + SIGINT, as shells have it
 
 app = typer.Typer(
@@ -144,15 +145,13 @@ Examples:
   devcad list pipelines""",
 )
 def list_(
-    what: Annotated[
-        str, typer.Argument(metavar="surfaces|curves|formats|pipelines|materials", help="Which.")
-    ],
+    what: Annotated[str, typer.Argument(metavar="|".join(LISTED), help="Which.")],
 ) -> int:
     """Name the kinds, formats, recipes and materials there are."""
+    if what not in LISTED:
+        _usage(f'there is no list "{what}"', what, LISTED)
     from devcad.report.lists import LISTS
 
-    if what not in LISTS:
-        _usage(f'there is no list "{what}"', what, LISTS)
     rows = LISTS[what]()
     width = max((len(name) for name in rows), default=0)
     for name, text in rows.items():
@@ -197,12 +196,8 @@ def run(arguments: Sequence[str]) -> int:
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="backslashreplace")
-    try:
-        code = _guarded(arguments)
-        sys.stdout.flush()
-    except BrokenPipeError:
-        console.close_stdout()
-        code = 0
+    code = _guarded(arguments)
+    console.flush()
     return code
 
 
@@ -218,7 +213,9 @@ def _guarded(arguments: Sequence[str]) -> int:
         return result if isinstance(result, int) else 0
     except (KeyboardInterrupt, typer.Abort):
         return INTERRUPTED
-    except BrokenPipeError:
+    except SystemExit as leave:
+        if leave.code == 1:  # typer's way to say that the reader of the help has gone
+            return 0
         raise
     except Exception as error:
         format_message = getattr(error, "format_message", None)  # one of typer's usage errors
@@ -346,12 +343,12 @@ def _formats(text: str) -> list[str]:
 
 def _checks(allow: Sequence[str] | None) -> list[str]:
     """The checks of --allow, given one by one or with commas."""
-    from devcad.checks import CHECKS
+    from devcad.checks import NAMES
 
     names = [name.strip() for text in allow or () for name in text.split(",")]
     for name in names:
-        if name not in CHECKS:
-            _usage(f'this version knows no check "{name}"', name, CHECKS)
+        if name not in NAMES:
+            _usage(f'this version knows no check "{name}"', name, NAMES)
     return names
 
 

@@ -12,19 +12,31 @@ BUG = DevcadError.code
 
 
 def say(line: str) -> None:
-    """A line on stdout."""
-    sys.stdout.write(f"{line}\n")
+    """A line on stdout; nothing happens where its reader has gone."""
+    try:
+        sys.stdout.write(f"{line}\n")
+    except BrokenPipeError:
+        _close_stdout()
+
+
+def flush() -> None:
+    """Let what was said be read; nothing happens where the reader has gone."""
+    try:
+        sys.stdout.flush()
+    except BrokenPipeError:
+        _close_stdout()
 
 
 def tell(error: DevcadError) -> None:
-    """An error line on stderr, after what was said so far."""
-    sys.stdout.flush()
-    sys.stderr.write(f"{error}\n")
+    """An error line on stderr, after what was said so far; control characters are escaped."""
+    flush()
+    shown = (c if c.isprintable() else ascii(c)[1:-1] for c in str(error))
+    sys.stderr.write(f"{''.join(shown)}\n")
 
 
-def close_stdout() -> None:
-    """The reader has gone: let nothing more be written, at exit neither."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+def _close_stdout() -> None:
+    """Let nothing more be written, at exit neither."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
 
 
 def debugging() -> bool:

@@ -14,8 +14,9 @@ from devcad.export import Options, Written, writer
 from devcad.export.folder import published
 from devcad.job.load import Job, JobPanel, load
 from devcad.job.recipe import Recipe, known_checks, known_formats, resolve
-from devcad.part import Part
+from devcad.part import Panel, Part
 from devcad.report import SvgOrigin, make_report, to_bytes
+from devcad.shop.materials import Material, material
 
 Progress = Callable[[str], None]
 """Told what begins now."""
@@ -62,6 +63,7 @@ def build(
     """
     job = job if isinstance(job, Job) else load(job)
     recipe = plan(job, pipeline=pipeline, allow=allow)
+    sheet = material(job.material) if job.material else None
     progress(f"{job.name}: geometry")
     try:
         specs = [spec for panel in job.panels for spec in _specs(panel, job)]
@@ -72,12 +74,14 @@ def build(
             reference=job.reference,
             tolerance=job.tolerance,
             bend=job.bend,
+            smallest_bend=sheet.smallest_bend(job.thickness) if sheet else None,
             allow=recipe.allow,
         )
     except DevcadError as error:
         raise error.at(place=job.path) from None
     return replace(
         part,
+        panels=tuple(_weighed(panel, sheet) for panel in part.panels),
         job_sha256=job.sha256,
         part_number=job.meta.part_number,
         description=job.meta.description,
@@ -130,7 +134,7 @@ def _specs(panel: JobPanel, job: Job) -> list[PanelSpec]:
     return [
         PanelSpec(
             name=f"{stem}{k}" if several else panel.name,
-            kind=panel.surface.kind,
+            kind=panel.kind,
             patches=patches,
             base_closed=built.base_closed,
             mm_per_unit=job.mm_per_unit,
@@ -140,6 +144,14 @@ def _specs(panel: JobPanel, job: Job) -> list[PanelSpec]:
         )
         for k, patches in enumerate(built.panels, start=1)
     ]
+
+
+def _weighed(panel: Panel, sheet: Material | None) -> Panel:
+    """The panel with its mass among its facts, where the material is known."""
+    if sheet is None or not panel.thickness:
+        return panel
+    mass = sheet.mass(panel.pattern.area, panel.thickness)
+    return replace(panel, facts={**panel.facts, "mass_g": mass})
 
 
 def _svg_origin(part: Part) -> SvgOrigin:

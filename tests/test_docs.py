@@ -110,7 +110,8 @@ def test_the_picture_is_what_its_script_draws() -> None:
     draw = names["picture"]
     assert callable(draw)
     drawn = draw(REPOSITORY / "samples" / "lampshade.toml")
-    assert drawn == (REPOSITORY / "samples" / "lampshade.svg").read_text()
+    shown = (REPOSITORY / "samples" / "lampshade.svg").read_text()
+    assert drawn == shown, "draw it again: python samples/picture.py"
 
 
 def test_contributing_shows_the_layers_that_the_tests_hold() -> None:

@@ -3,16 +3,27 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
 from devcad.export._step_body import Arc, Cone, Curve, Cylinder, Line, Point, Straight, Trace
+from devcad.export._step_chart import Chart, heights
 from devcad.export._step_strips import Strip, smooth_courses
-from devcad.geometry.fit import FLOOR, Course, Demand, Ends, Fit, fit
+from devcad.geometry.fit import (
+    FLOOR,
+    TWIST_LIMIT,
+    Course,
+    Demand,
+    Ends,
+    Fit,
+    fit,
+    ruled_twist,
+)
 from devcad.geometry.taylor import Array
 
-EDGE_TOLERANCE = 2e-7  # mm: an edge on an exact face; above 1e-6 kernels call it loose
-THICKNESS_SHARE = 5e-6  # of the thickness; the volume has to hold within 1e-5
+EDGE_TOLERANCE = 3e-8  # mm: an edge on an exact face, twice (space and place) below 1e-7
+THICKNESS_SHARE = 2e-5  # of the thickness; its mean, and so the volume, is ten times closer
 PER_SPAN = (np.arange(5) + 0.5) / 5.0  # places in a span where the written file is measured
 
 
@@ -33,76 +44,6 @@ class Piece:
     probes: tuple[Array, Array]
 
 
-@dataclass(frozen=True, slots=True)
-class Chart:
-    """Angle about the axis and height along the ruling on a circular cylinder or cone.
-
-    ``side`` is +1 where the front is outside. The angle counts from ``x`` so that it is never
-    negative on the strip, ``turn`` = +-1 as it grows or falls with t.
-    """
-
-    strip: Strip
-    axis: Array
-    x: Array
-    side: float
-    turn: float
-    t: Array
-    u: Array
-
-    def angle(self, t: Array) -> Array:
-        """The angle u at t, (n,)."""
-        radial = self.radial(t)
-        raw = np.arctan2(radial @ np.cross(self.axis, self.x), radial @ self.x)
-        near = np.interp(t, self.t, self.u)
-        return np.asarray(raw + 2.0 * np.pi * np.round((near - raw) / (2.0 * np.pi)))
-
-    def radial(self, t: Array) -> Array:
-        """The unit direction away from the axis at t, (n, 3)."""
-        return _radial(self.strip, self.axis, self.side, t)
-
-    def surface(self, layer: int, reach: Array) -> Cylinder | Cone:
-        """The skin of a layer; a cone's circle of reference goes through the widest of the points
-        ``reach`` (k, 3) of that layer."""
-        shape, d = self.strip.shape, self.strip.layers[layer]
-        assert shape.point is not None
-        if shape.radius is not None:
-            return Cylinder(shape.point, self.axis, self.x, shape.radius + self.side * d)
-        assert shape.half_angle is not None
-        sine, cosine = np.sin(shape.half_angle), np.cos(shape.half_angle)
-        apex = shape.point - self.side * d / sine * self.axis
-        slant = float(np.linalg.norm(reach - apex, axis=1).max())
-        return Cone(
-            apex + slant * cosine * self.axis, self.axis, self.x, slant * sine, shape.half_angle
-        )
-
-
-def chart(strip: Strip) -> Chart:
-    """The chart of a strip on a circular cylinder or cone."""
-    shape = strip.shape
-    assert shape.axis is not None and shape.point is not None
-    axis = shape.axis / np.linalg.norm(shape.axis)
-    t = np.linspace(*strip.ends, 257)
-    rails = strip.rails(t[128:129])[0].mean(axis=1)
-    arm = rails.mean(axis=0) - shape.point
-    normal = strip.patch.frame(t[128:129]).n[0]
-    side = 1.0 if normal @ (arm - (arm @ axis) * axis) > 0.0 else -1.0
-    radial = _radial(strip, axis, side, t)
-    y = np.cross(axis, radial[0])
-    u = np.unwrap(np.arctan2(radial @ y, radial @ radial[0]))
-    if u[-1] > 0.0:
-        return Chart(strip, axis, radial[0], side, 1.0, t, u)
-    return Chart(strip, axis, radial[-1], side, -1.0, t, u - u[-1])
-
-
-def heights(surface: Cylinder | Cone, points: Array) -> Array:
-    """The coordinate v of points (n, 3) on the surface, (n,)."""
-    if isinstance(surface, Cylinder):
-        return np.asarray((points - surface.point) @ surface.axis)
-    slant = surface.radius / np.sin(surface.half_angle)
-    apex = surface.point - slant * np.cos(surface.half_angle) * surface.axis
-    return np.asarray(np.linalg.norm(points - apex, axis=1) - slant)
-
-
 def fitted_rails(
     strip: Strip, corners: Array, tolerance: float, degree: int
 ) -> tuple[Fit, Array, Array]:
@@ -115,20 +56,31 @@ def fitted_rails(
     faces = tuple((blocks[k], blocks[layers + k]) for k in range(layers))
     t, s = strip.course.t, strip.course.s
     speeds = np.diff(t)[[0, -1]] / np.diff(s)[[0, -1]]
-    slopes = strip.slopes(strip.ends).reshape(2, -1) * speeds[:, None]
+    slopes = strip.end_slopes().reshape(2, -1) * speeds[:, None]
     for side in np.nonzero(strip.tips)[0]:
         if layers == 1:
             slopes[:, blocks[side]] = 0.0
     held = (slopes[0], slopes[1]) if np.isfinite(slopes).all() else None
-    ends = Ends((corners[0].ravel(), corners[1].ravel()), held)
     result = fit(
         lambda x: strip.rails(x).reshape(len(x), -1),
         strip.course,
-        ends,
-        Demand(degree, tolerance, blocks, faces, *_thickness(strip, blocks)),
+        Ends((corners[0].ravel(), corners[1].ravel()), held),
+        Demand(degree, tolerance, blocks, faces, *_thickness(strip, blocks), _twist_limit(strip)),
     )
     probe = _probe_places(result)
     return result, probe, strip.rails(strip.course(probe))
+
+
+def _twist_limit(strip: Strip) -> float:
+    """0.01 degree, more only where the surface itself twists and that was allowed."""
+    t = strip.course.t
+    t = np.unique(np.concatenate([np.linspace(a, b, 19)[1:-1] for a, b in pairwise(t)]))
+    rails, slopes = strip.rails(t), strip.slopes(t)
+    own = max(
+        float(ruled_twist(rails[:, 0, k], slopes[:, 0, k], rails[:, 1, k], slopes[:, 1, k]).max())
+        for k in range(len(strip.layers))
+    )
+    return TWIST_LIMIT if own <= TWIST_LIMIT else 1.1 * own
 
 
 def _thickness(
@@ -141,29 +93,15 @@ def _thickness(
     return ((blocks[0], blocks[1]), (blocks[2], blocks[3])), gap
 
 
-def analytic_pieces(
-    strip: Strip,
-    side: int,
-    corners: Array,
-    lifts: Array,
-    skins: list[Cylinder | Cone] | None,
-    frame: Chart | None,
-    size: float,
-    tolerance: float,
-    degree: int,
-) -> list[Piece]:
-    """One long edge of a plane, cylinder or cone as pieces.
-
-    ``corners`` (2 ends, layers, 3); ``lifts`` (2 ends, 3) is the mitre's part of the skin's
-    offset per unit of thickness, 0 without a crease; ``skins`` and ``frame`` belong to cylinders
-    and cones.
-    """
-    edge = _Edge(strip, side, corners, lifts, skins, frame, size, tolerance, degree)
-    return edge.pieces()
-
-
 @dataclass(frozen=True, slots=True)
-class _Edge:
+class LongEdge:
+    """One long edge of a plane, cylinder or cone.
+
+    ``corners`` (2 ends, layers, 3); ``lifts`` (2 ends, 3) is what a mitre adds to the skin's offset
+    for a unit of thickness, 0 without a crease; ``skins`` and ``chart`` belong to cylinders and
+    cones.
+    """
+
     strip: Strip
     side: int
     corners: Array
@@ -201,7 +139,7 @@ class _Edge:
         """Neighbouring stretches between breaks that are one line, one arc, or neither."""
         borders = self.strip.course.t
         runs: list[tuple[str, Array]] = []
-        for a, b in zip(borders[:-1], borders[1:], strict=True):
+        for a, b in pairwise(borders):
             kind = self._kind(np.array([a, b]))
             if runs and runs[-1][0] == kind:
                 joined = np.append(runs[-1][1], b)
@@ -214,9 +152,7 @@ class _Edge:
     def _kind(self, borders: Array) -> str:
         """What the middle edge is between the first and last of the borders."""
         steps = np.linspace(0.0, 1.0, 13)
-        t = np.unique(
-            np.concatenate([a + (b - a) * steps for a, b in zip(borders[:-1], borders[1:], strict=True)])
-        )
+        t = np.unique(np.concatenate([a + (b - a) * steps for a, b in pairwise(borders)]))
         layers = self.points(t)
         if self.skins is not None:
             level = np.ptp(heights(self.skins[0], layers[:, 0]))
@@ -229,7 +165,10 @@ class _Edge:
             if off.max() <= FLOOR * self.size:
                 return "line"
         ends = self.strip.ends
-        bent = [(t[0] == ends[0]) and self.lifts[0].any(), (t[-1] == ends[1]) and self.lifts[1].any()]
+        bent = [
+            (t[0] == ends[0]) and self.lifts[0].any(),
+            (t[-1] == ends[1]) and self.lifts[1].any(),
+        ]
         centre = None if any(bent) else circle_centre(points, self.size)
         return "free" if centre is None else "arc"
 
@@ -380,12 +319,6 @@ def _sweep(arc: Arc, points: Array) -> tuple[float, float]:
     arms = points - arc.centre
     u = np.unwrap(np.arctan2(arms @ np.cross(arc.axis, arc.x), arms @ arc.x))
     return 0.0, float(u[-1] - u[0])
-
-
-def _radial(strip: Strip, axis: Array, side: float, t: Array) -> Array:
-    n = side * strip.patch.frame(t).n
-    out = n - (n @ axis)[:, None] * axis
-    return np.asarray(out / np.linalg.norm(out, axis=1)[:, None])
 
 
 def _probe_places(result: Fit) -> Array:

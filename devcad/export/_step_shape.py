@@ -49,7 +49,6 @@ from devcad.geometry.fit import Spline
 from devcad.geometry.taylor import Array
 
 TOLERANCE = 1e-7  # mm: the kernel's own confusion distance
-FITTED_EDGE = 5e-7  # mm: a fitted edge lies within 2e-7 of its exact face
 
 _BUILDER = BRep_Builder()
 
@@ -101,10 +100,8 @@ def _face(face: Face, plans: tuple[Edge, ...], edges: list[TopoDS_Edge]) -> Topo
     for use in uses:
         edge, plan = edges[use.edge], plans[use.edge]
         if use.trace is not None:
-            loose = isinstance(use.trace, Spline)
-            tolerance = FITTED_EDGE if loose else TOLERANCE
             _BUILDER.UpdateEdge(
-                edge, _curve2d(use.trace, plan.span), surface, TopLoc_Location(), tolerance
+                edge, _curve2d(use.trace, plan.span), surface, TopLoc_Location(), TOLERANCE
             )
             _BUILDER.Range(edge, surface, TopLoc_Location(), *plan.span)
         oriented = edge if use.forward != face.flipped else edge.Reversed()

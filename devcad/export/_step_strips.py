@@ -8,12 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
 from devcad.errors import GeometryError
 from devcad.geometry import taylor
-from devcad.geometry.classify import Shape
+from devcad.geometry.classify import Shape, classify
 from devcad.geometry.fit import FLOOR, Course
 from devcad.geometry.patch import Patch
 from devcad.geometry.taylor import Array
@@ -22,6 +23,7 @@ from devcad.part import Panel
 FITTED_PARTS = 4  # general-purpose area and volume rules need closed surfaces in quarters
 ANALYTIC_PARTS = 2  # no seam edge, no face of a whole turn
 SMOOTH_SPEED = 1e-7  # relative jump of the derivative that a C1 spline may smooth over
+MOST_BREAKS = 64  # a curve through hundreds of points is no chain of lines and arcs
 SAMPLES = 257
 
 
@@ -68,6 +70,19 @@ class Strip:
         along = v[..., None] * f.e[:, None, None]
         return np.asarray(f.c0[:, None, None] + along + d[:, None] * f.n[:, None, None])
 
+    def end_slopes(self) -> Array:
+        """d/dt of ``rails`` at both ends, from inside, (2 ends, 2 sides, layers, 3).
+
+        At a break the patch may give the other side's derivatives, so three places inside are
+        carried on to the end, to third order.
+        """
+        start, end = self.ends
+        step = 1e-4 * np.arange(1.0, 4.0)
+        first, last = np.diff(self.course.t)[[0, -1]]
+        inside = self.slopes(np.concatenate([start + step * first, end - step * last]))
+        carry = np.array([3.0, -3.0, 1.0])
+        return np.stack([np.tensordot(carry, inside[k : k + 3], 1) for k in (0, 3)])
+
     def slopes(self, t: Array) -> Array:
         """d/dt of ``rails``, (n, 2 sides, layers, 3)."""
         if self.layers == (0.0,):
@@ -95,15 +110,9 @@ def strips(panel: Panel) -> tuple[list[Strip], int]:
     size = panel_size(panel)
     for patch, shape in zip(chain.patches, panel.shapes, strict=True):
         whole = Strip(patch, shape, layers, _plain(patch.segments), 0, 1, _tips(patch, size))
-        alone = around and len(chain.patches) == 1
-        cuts = _analytic_cuts(whole, alone) if shape.analytic else _fitted_cuts(whole, alone)
-        if shape.analytic:
-            courses = [_plain(_within(patch.segments, a, b)) for a, b in _pairs(cuts)]
-        else:
-            courses = smooth_courses(lambda t, w=whole: _flat(w.slopes(t)), patch.segments, cuts)
-        for course in courses:
+        for kind, course in _pieces(whole, around and len(chain.patches) == 1):
             k = len(out)
-            out.append(Strip(patch, shape, layers, course, k, k + 1, whole.tips))
+            out.append(Strip(patch, kind, layers, course, k, k + 1, whole.tips))
     count = len(out) if around else len(out) + 1
     out[-1] = replace(out[-1], last=out[-1].last % count)
     return out, count
@@ -128,7 +137,7 @@ def smooth_courses(slopes: Callable[[Array], Array], breaks: Array, cuts: Array)
     borders = np.unique(np.concatenate([breaks, cuts]))
     borders = borders[(borders >= cuts[0]) & (borders <= cuts[-1])]
     scale = 1.0
-    for k, (a, b) in enumerate(_pairs(borders)):
+    for k, (a, b) in enumerate(pairwise(borders)):
         if k:
             ratio = None if a in cuts else _speed_ratio(slopes, borders[k - 1], a, b)
             if ratio is None:
@@ -187,21 +196,69 @@ def _turning(patch: Patch, t: Array) -> Array:
     return np.concatenate([[0.0], np.cumsum(np.hypot(*steps))])
 
 
-def _fitted_cuts(strip: Strip, alone: bool) -> Array:
-    """Where a fitted surface is cut: in quarters of its length when it closes alone."""
-    start, end = strip.ends
-    if not alone:
-        return np.array([start, end])
+def _pieces(whole: Strip, alone: bool) -> list[tuple[Shape, Course]]:
+    """The faces of a patch: what each is, and its course in t."""
+    segments = whole.patch.segments
+    if whole.shape.analytic:
+        cuts = _analytic_cuts(whole, alone)
+        return [(whole.shape, _plain(_within(segments, a, b))) for a, b in pairwise(cuts)]
+    runs = _runs(whole)
+    pieces = _smooth_pieces(whole, runs, [])
+    if alone and len(pieces) < FITTED_PARTS:
+        pieces = _smooth_pieces(whole, runs, _quarters(whole))
+    return pieces
+
+
+def _runs(whole: Strip) -> list[tuple[Shape, Array]]:
+    """Stretches of a general patch between breaks that are planes, circular cylinders or right
+    circular cones for themselves (the sides and corners of a rounded box), and those that are
+    not, each with its borders."""
+    patch, segments = whole.patch, whole.patch.segments
+    if not 0 < len(patch.breaks) <= MOST_BREAKS:
+        return [(whole.shape, segments)]
+    runs: list[tuple[Shape, Array]] = []
+    for a, b in pairwise(segments):
+        shape = classify(patch.restricted(a, b))
+        shape = shape if shape.analytic else whole.shape
+        if runs and runs[-1][0].analytic == shape.analytic:
+            joined = np.append(runs[-1][1], b)
+            both = classify(patch.restricted(joined[0], b)) if shape.analytic else shape
+            if both.analytic == shape.analytic:
+                runs[-1] = (both, joined)
+                continue
+        runs.append((shape, np.array([a, b])))
+    return runs
+
+
+def _smooth_pieces(
+    whole: Strip, runs: list[tuple[Shape, Array]], cuts: list[float]
+) -> list[tuple[Shape, Course]]:
+    """The runs, the fitted ones cut at ``cuts`` and wherever they are not C1."""
+    out: list[tuple[Shape, Course]] = []
+    for shape, borders in runs:
+        if shape.analytic:
+            out.append((shape, _plain(borders)))
+            continue
+        inner = [c for c in cuts if borders[0] < c < borders[-1]]
+        places = np.array([borders[0], *inner, borders[-1]])
+        courses = smooth_courses(lambda t: _flat(whole.slopes(t)), borders, places)
+        out += [(shape, course) for course in courses]
+    return out
+
+
+def _quarters(whole: Strip) -> list[float]:
+    """Parameters at the quarters of a patch's length, or at a break close by."""
+    start, end = whole.ends
     t = np.linspace(start, end, SAMPLES)
-    middle = strip.rails(t).mean(axis=(1, 2))
+    middle = whole.rails(t).mean(axis=(1, 2))
     length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(middle, axis=0), axis=1))])
     share = np.arange(1, FITTED_PARTS) / FITTED_PARTS
     cuts = np.interp(share * length[-1], length, t)
-    for b in strip.patch.breaks:  # a break nearby is the cheaper place
+    for b in whole.patch.breaks:  # a knot that is there already costs nothing
         near = int(np.argmin(np.abs(cuts - b)))
         if abs(cuts[near] - b) < 0.05 * (end - start):
             cuts[near] = b
-    return np.concatenate([[start], np.unique(cuts), [end]])
+    return [float(c) for c in np.unique(cuts)]
 
 
 def _tips(patch: Patch, size: float) -> tuple[bool, bool]:
@@ -225,7 +282,3 @@ def _within(borders: Array, a: float, b: float) -> Array:
 
 def _flat(x: Array) -> Array:
     return x.reshape(len(x), -1)
-
-
-def _pairs(x: Array) -> zip[tuple[float, float]]:
-    return zip(x[:-1], x[1:], strict=True)

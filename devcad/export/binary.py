@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -14,7 +14,7 @@ from devcad.checks import Check
 from devcad.errors import CheckFailed, FileError
 from devcad.geometry.taylor import Array
 
-BLOCK = 32768
+BLOCK = 65536
 """Rows handled at a time: large against the cost of a call, small against the cache."""
 
 FLOAT32_STEP = 2.0**-23
@@ -26,31 +26,35 @@ def blocks(n: int) -> Iterator[slice]:
     return (slice(start, min(start + BLOCK, n)) for start in range(0, n, BLOCK))
 
 
-def largest(values: Array) -> float:
-    """The largest absolute coordinate of points (n, 3); column by column, which numpy does fast."""
-    return max(
-        float(max(-column.min(), column.max())) for column in (values[:, k] for k in range(3))
-    )
+def bounds(read: Callable[[slice], NDArray[Any]], n: int) -> NDArray[Any]:
+    """The lowest and the highest coordinates of n points, (2, 3), as ``read(rows)`` gives them."""
+    ends = []
+    for rows in blocks(n):
+        columns = read(rows).T
+        ends.append([[c.min() for c in columns], [c.max() for c in columns]])
+    return np.stack([np.min(ends, axis=0)[0], np.max(ends, axis=0)[1]])
 
 
 Axis = tuple[int, float, float]
 """Column, factor and offset: how one coordinate is restored from what was read."""
 
 
-def apart(read: NDArray[Any], axes: Sequence[Axis], true: Array) -> float:
+def apart(read: Callable[[slice], NDArray[Any]], axes: Sequence[Axis], true: Array) -> float:
     """A bound on the distance between each row of ``true`` (n, d) and what restores it.
 
-    Column k of ``true`` is compared with factor * read[:, column] + offset of ``axes[k]``; the
-    bound is the length of the vector of largest differences, at most sqrt(d) too long. It is
-    nan if anything is.
+    ``read(rows)`` gives the rows read, a block at a time. Column k of ``true`` is compared with
+    factor * read[:, column] + offset of ``axes[k]``; the bound is the length of the vector of
+    largest differences, at most sqrt(d) too long. It is nan if anything is.
     """
     worst = np.zeros(true.shape[1])
     for rows in blocks(len(true)):
+        block, expected = read(rows), true[rows]
         for k, (column, factor, offset) in enumerate(axes):
-            step = read[rows, column].astype(float)
+            step = block[:, column].astype(float)
             step *= factor
-            step += offset
-            step -= true[rows, k]
+            if offset:
+                step += offset
+            step -= expected[:, k]
             worst[k] = np.maximum(worst[k], np.maximum(step.max(), -step.min()))
     return float(np.sqrt(worst @ worst))
 

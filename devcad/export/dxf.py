@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import io
 import json
+import logging
 import os
 import sys
 import tempfile
@@ -52,6 +53,7 @@ LAYERS = {
 DASHED = ("BEND_UP", "BEND_DOWN")
 DASHES = [15.0, 10.0, -5.0]  # mm: period, dash, gap
 VERSIONS = ("R12", "R2000", "R2010")
+MILLIMETRES = 4  # $INSUNITS
 SHARE = 0.1  # of the part's tolerance goes into the drawing
 
 
@@ -96,7 +98,7 @@ def _write_panel(part: Part, panel: Panel, folder: Path, options: Options) -> Wr
     mark = "-mm" if options.dxf_version == "R12" else ""  # R12 cannot say its unit
     path = drawing_path(part, panel, folder, "dxf", mark)
     limit = SHARE * part.tolerance
-    with _fixed_meta_data() as ezdxf:
+    with _library_at_rest() as ezdxf:
         document = _document(ezdxf, options.dxf_version)
         space = document.modelspace()
         _add_lines(space, panel)
@@ -133,15 +135,19 @@ def _deviation_check(panel: Panel, value: float, limit: float) -> Check:
 
 
 @contextmanager
-def _fixed_meta_data() -> Iterator[Any]:
-    """The drawing library, told to write no date and no random identifier meanwhile."""
+def _library_at_rest() -> Iterator[Any]:
+    """The drawing library, told to write no date and no random identifier meanwhile, and not to
+    warn that R12 cannot say its unit."""
     ezdxf = _library()
-    before = ezdxf.options.write_fixed_meta_data_for_testing
+    log = logging.getLogger("ezdxf")
+    before, level = ezdxf.options.write_fixed_meta_data_for_testing, log.level
     ezdxf.options.write_fixed_meta_data_for_testing = True
+    log.setLevel(logging.ERROR)
     try:
         yield ezdxf
     finally:
         ezdxf.options.write_fixed_meta_data_for_testing = before
+        log.setLevel(level)
 
 
 def _library() -> Any:
@@ -174,9 +180,9 @@ def _library() -> Any:
 
 def _document(ezdxf: Any, version: str) -> Any:
     """An empty drawing in mm with all layers."""
-    document = ezdxf.new(version, setup=False)
+    document = ezdxf.new(version, setup=False, units=MILLIMETRES)
     if version != "R12":
-        document.header["$INSUNITS"] = 4  # millimetres
+        document.header["$INSUNITS"] = MILLIMETRES
         document.header["$MEASUREMENT"] = 1  # metric
     document.linetypes.add("DASHED", DASHES, description="Dashed __ __ __")
     for name, colour in LAYERS.items():
@@ -254,12 +260,13 @@ def _read(path: Path, panel: Panel, version: str) -> Any:
     ezdxf = _library()
     try:
         document = ezdxf.readfile(str(path))
-    except (ezdxf.DXFError, OSError, ValueError) as error:
-        raise torn(READBACK, path, f"not readable: {error}", panel=panel.name) from error
+    except Exception as error:  # a torn file ends the parser anywhere, also by StopIteration
+        what = f"not readable: {str(error) or type(error).__name__}"
+        raise torn(READBACK, path, what, panel=panel.name) from error
     errors = document.audit().errors
     if errors:
         raise torn(READBACK, path, errors[0].message, panel=panel.name)
-    if version != "R12" and document.header.get("$INSUNITS") != 4:
+    if version != "R12" and document.header.get("$INSUNITS") != MILLIMETRES:
         raise torn(READBACK, path, "the unit is not the millimetre", panel=panel.name)
     return document
 

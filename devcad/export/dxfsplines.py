@@ -66,7 +66,9 @@ def chain_deviation(
         worst = max(worst, found)
     if outer or inner:
         raise torn("dxf-readback", path, "more contours were read than written", panel=panel.name)
-    return worst
+    x0, y0, x1, y1 = panel.pattern.bbox
+    exact = worst <= JOINED * max(x1 - x0, y1 - y0) and not space.query("SPLINE")
+    return 0.0 if exact else worst
 
 
 def _contour_deviation(
@@ -93,7 +95,7 @@ def _contour_deviation(
     for (_, a), (b, _) in zip(ends, ends[1:] + ends[:1], strict=True):
         if np.hypot(*(a - b)) > JOINED * size:
             raise torn("dxf-readback", path, "a contour is not closed", panel=panel)
-    return worst if worst > JOINED * size else 0.0
+    return worst
 
 
 def _dense(u: Array) -> Array:

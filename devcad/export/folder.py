@@ -75,7 +75,7 @@ def _unwritable(target: Path, reason: str) -> FileError:
 def _synchronise(folder: Path) -> None:
     """Bring the files and the folder's own entries to the disk."""
     for path in sorted(folder.iterdir()):
-        with path.open("rb") as stream:
+        with path.open("r+b") as stream:
             os.fsync(stream.fileno())
     _synchronise_entries(folder)
 

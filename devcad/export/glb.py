@@ -22,7 +22,7 @@ from devcad import __version__
 from devcad.checks import Check, at_most
 from devcad.errors import LimitError
 from devcad.export import Options, Written
-from devcad.export.binary import FLOAT32_STEP, apart, blocks, demanded, largest, opened, torn
+from devcad.export.binary import FLOAT32_STEP, apart, blocks, bounds, demanded, opened, torn
 from devcad.geometry.taylor import Array
 from devcad.part import Panel, Part
 from devcad.units import METRES_PER_MM
@@ -133,8 +133,9 @@ def _indices(panel: Panel) -> NDArray[Any]:
     degenerate = (a == b) | (b == c) | (c == a)
     if degenerate.any():
         triangles = triangles[~degenerate]
-    short = len(panel.mesh.vertices) <= MOST_SHORT_VERTICES
-    return np.ascontiguousarray(triangles, "<u2" if short else "<u4").ravel()
+    if len(panel.mesh.vertices) <= MOST_SHORT_VERTICES:
+        return triangles.astype("<u2").ravel()
+    return np.ascontiguousarray(triangles, "<i4").view("<u4").ravel()  # no copy
 
 
 def _positions(points: Array) -> Floats:
@@ -250,11 +251,11 @@ def _tables(pieces: list[_Piece]) -> tuple[list[Json], list[Json]]:
             (VERTEX_TARGET, FLOAT, count, "VEC2", {}),
             (INDEX_TARGET, index_type, piece.indices.size, "SCALAR", {}),
         ]
-        for (target, kind, number, shape, bounds), size in zip(rows, piece.sizes, strict=True):
+        for (target, kind, number, shape, ends), size in zip(rows, piece.sizes, strict=True):
             length = piece.indices.nbytes if target == INDEX_TARGET else size
             accessors.append(
                 {"bufferView": len(views), "componentType": kind, "count": number, "type": shape}
-                | bounds
+                | ends
             )
             views.append(
                 {"buffer": 0, "byteOffset": offset, "byteLength": length, "target": target}
@@ -265,82 +266,110 @@ def _tables(pieces: list[_Piece]) -> tuple[list[Json], list[Json]]:
 
 def _bounds(vertices: Array) -> Json:
     """Exact bounds of the positions written: rounding is monotone, so it may come last."""
-    columns = [vertices[:, k] for k in range(3)]
-    ends = _positions(np.array([[f(c) for c in columns] for f in (np.min, np.max)]))
+    ends = _positions(bounds(lambda rows: vertices[rows], len(vertices)))
     return {"min": ends.min(axis=0).tolist(), "max": ends.max(axis=0).tolist()}
+
+
+@dataclass(frozen=True, slots=True)
+class _Stored:
+    """An accessor's numbers in the open file, (count, width) from ``offset`` on."""
+
+    stream: BinaryIO
+    offset: int
+    kind: np.dtype[Any]
+    count: int
+    width: int
+
+    def rows(self, rows: slice) -> NDArray[Any]:
+        """Some of its rows, read now."""
+        size = self.kind.itemsize * self.width
+        self.stream.seek(self.offset + rows.start * size)
+        numbers = np.fromfile(self.stream, self.kind, (rows.stop - rows.start) * self.width)
+        return numbers.reshape(-1, self.width)
 
 
 def _read_back(path: Path, pieces: list[_Piece], total: int) -> tuple[Check, ...]:
     """Parse the file by its own tables and compare it with the meshes."""
-    document, data = _parse(path, total)
     moved = []
-    for node, piece in zip(document["nodes"], pieces, strict=True):
-        (primitive,) = document["meshes"][node["mesh"]]["primitives"]
-        attributes = primitive["attributes"]
-        position = _accessor(document, data, attributes["POSITION"])
-        normal = _accessor(document, data, attributes["NORMAL"])
-        place = _accessor(document, data, attributes["TEXCOORD_0"])
-        indices = _accessor(document, data, primitive["indices"])
-        bounds = document["accessors"][attributes["POSITION"]]
-        columns = [position[:, k] for k in range(3)]
-        if [float(c.min()) for c in columns] != bounds["min"] or [
-            float(c.max()) for c in columns
-        ] != bounds["max"]:
-            raise torn(CHECK, path, "bounds are not exact", panel=piece.panel.name)
-        if not np.array_equal(indices.ravel(), piece.indices):
-            raise torn(CHECK, path, "the indices read differ", panel=piece.panel.name)
-        checks = _checks(piece, document["extras"]["mm_per_uv"], position, normal, place)
-        moved.append(demanded(checks, path)[0])
+    with opened(path, "rb") as stream:
+        document, start = _parse(stream, path, total)
+        for node, piece in zip(document["nodes"], pieces, strict=True):
+            (primitive,) = document["meshes"][node["mesh"]]["primitives"]
+            named = primitive["attributes"] | {"indices": primitive["indices"]}
+            stored = {
+                name: _stored(stream, start, document, index) for name, index in named.items()
+            }
+            told = document["accessors"][named["POSITION"]]
+            if not _holds(stored, told, piece):
+                raise torn(CHECK, path, "indices or bounds differ", panel=piece.panel.name)
+            size = max(map(abs, told["min"] + told["max"])) / METRES_PER_MM
+            checks = _checks(piece, size, document["extras"]["mm_per_uv"], stored)
+            moved.append(demanded(checks, path)[0])
     return tuple(moved)
 
 
-def _parse(path: Path, total: int) -> tuple[Json, NDArray[np.uint8]]:
-    """The JSON and the binary chunk of a GLB file whose lengths agree with one another."""
-    with opened(path, "rb") as stream:
-        actual = path.stat().st_size
-        if actual != total:
-            raise torn(CHECK, path, f"{actual} bytes, not {total}")
-        *head, told, size, kind = np.fromfile(stream, "<u4", 5).tolist()
-        text = stream.read(size)
-        rest = np.fromfile(stream, np.uint8)
-    length, binary = rest[:8].view("<u4").tolist() if rest.size >= 8 else (0, 0)
-    if (*head, told, kind, binary) != (MAGIC, VERSION, total, JSON_CHUNK, BIN_CHUNK):
-        raise torn(CHECK, path, "damaged chunk headers")
+def _parse(stream: BinaryIO, path: Path, total: int) -> tuple[Json, int]:
+    """The JSON of a GLB file whose lengths agree with one another; where its numbers start."""
+    actual = path.stat().st_size
+    if actual != total:
+        raise torn(CHECK, path, f"{actual} bytes, not {total}")
+    *head, told, size, kind = np.fromfile(stream, "<u4", 5).tolist()
+    if (*head, told, kind) != (MAGIC, VERSION, total, JSON_CHUNK) or 28 + size > total:
+        raise torn(CHECK, path, "damaged header")
     try:
-        document: Json = json.loads(text)
+        document: Json = json.loads(stream.read(size))
     except ValueError:
         raise torn(CHECK, path, "damaged JSON") from None
-    if length != rest.size - 8 or length != document["buffers"][0]["byteLength"]:
-        raise torn(CHECK, path, "the lengths of the chunks disagree")
-    return document, rest[8:]
+    length, binary = np.fromfile(stream, "<u4", 2).tolist()
+    if (28 + size + length, binary) != (total, BIN_CHUNK):
+        raise torn(CHECK, path, "damaged chunk header")
+    return document, 28 + size
 
 
-def _accessor(document: Json, data: NDArray[np.uint8], index: int) -> NDArray[Any]:
-    """The numbers of an accessor, (count, components); a view into the data."""
+def _stored(stream: BinaryIO, start: int, document: Json, index: int) -> _Stored:
+    """Where an accessor's numbers are."""
     accessor = document["accessors"][index]
     view = document["bufferViews"][accessor["bufferView"]]
-    kind = {5126: "<f4", 5123: "<u2", 5125: "<u4"}[accessor["componentType"]]
+    kind = np.dtype({5126: "<f4", 5123: "<u2", 5125: "<u4"}[accessor["componentType"]])
     width = {"SCALAR": 1, "VEC2": 2, "VEC3": 3}[accessor["type"]]
-    piece = data[view["byteOffset"] : view["byteOffset"] + view["byteLength"]]
-    return piece.view(kind).reshape(accessor["count"], width)
+    return _Stored(stream, start + view["byteOffset"], kind, accessor["count"], width)
+
+
+def _holds(stored: dict[str, _Stored], told: Json, piece: _Piece) -> bool:
+    """Whether the indices are the mesh's and the bounds told those of the positions."""
+    indices, position = stored["indices"], stored["POSITION"]
+    if (indices.count, position.count) != (piece.indices.size, len(piece.panel.mesh.vertices)):
+        return False
+    return bounds(position.rows, position.count).tolist() == [told["min"], told["max"]] and all(
+        np.array_equal(indices.rows(rows)[:, 0], piece.indices[rows])
+        for rows in blocks(indices.count)
+    )
 
 
 def _checks(
-    piece: _Piece, mm_per_uv: float, position: Floats, normal: Floats, place: Floats
+    piece: _Piece, size: float, mm_per_uv: float, stored: dict[str, _Stored]
 ) -> list[Check]:
-    """Distances between what was read and the mesh, each against what float32 allows."""
+    """Distances between what was read and the mesh, each against what float32 allows.
+
+    ``size`` is the largest coordinate in mm.
+    """
     mesh, name = piece.panel.mesh, piece.panel.name
     x, y = piece.corner
-    moved = apart(position, [(0, 1e3, 0.0), (2, -1e3, 0.0), (1, 1e3, 0.0)], mesh.vertices)
-    turned = apart(normal, [(0, 1.0, 0.0), (2, -1.0, 0.0), (1, 1.0, 0.0)], mesh.normals)
-    slid = apart(place, [(0, mm_per_uv, x), (1, -mm_per_uv, y + mm_per_uv)], mesh.flat)
-    step = FLOAT32_STEP * largest(mesh.vertices)
+    moved = apart(
+        stored["POSITION"].rows, [(0, 1e3, 0.0), (2, -1e3, 0.0), (1, 1e3, 0.0)], mesh.vertices
+    )
+    turned = apart(
+        stored["NORMAL"].rows, [(0, 1.0, 0.0), (2, -1.0, 0.0), (1, 1.0, 0.0)], mesh.normals
+    )
+    slid = apart(
+        stored["TEXCOORD_0"].rows, [(0, mm_per_uv, x), (1, -mm_per_uv, y + mm_per_uv)], mesh.flat
+    )
     return [
         at_most(
             CHECK,
             name,
             moved,
-            step,
+            FLOAT32_STEP * size,
             "mm",
             says=f"the vertices read lie up to {moved:.3g} mm from the mesh's",
             remedy="move the part nearer to the origin",

@@ -18,6 +18,7 @@ from devcad.flatten.polylines import polyline_outline
 from devcad.part import Panel, Part
 
 EXACT = 1e-9  # of the pattern's size: below it a recognised line or arc counts as exact
+ROUNDING = 1e-11  # of the pattern's size: the accuracy of its outline, 1e-9 mm per 100 mm
 
 FITS = {"arcs": fit_outline, "polyline": polyline_outline}
 
@@ -86,12 +87,13 @@ def measured(read: Contours, panel: Panel, limit: float, path: Path, name: str) 
             raise torn(name, path, fault, panel=panel.name)
     area = sum(loops.area(loop) for loop, _ in pairs)
     border = sum(loops.perimeter(loop) for loop, _ in pairs)
-    slack = found * border + 1e-9 * (pattern.area + found**2)
+    x0, y0, x1, y1 = pattern.bbox
+    size = max(x1 - x0, y1 - y0)
+    slack = (found + ROUNDING * size) * border + EXACT * pattern.area
     if abs(area - pattern.area) > slack:
         what = f"an area of {area:.12g} mm2 was read, the pattern has {pattern.area:.12g}"
         raise torn(name, path, what, panel=panel.name)
-    x0, y0, x1, y1 = pattern.bbox
-    return 0.0 if read.exact and found <= EXACT * max(x1 - x0, y1 - y0) else found
+    return 0.0 if read.exact and found <= EXACT * size else found
 
 
 def _fault(loop: Loop, *, outer: bool) -> str:

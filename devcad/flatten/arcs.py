@@ -15,13 +15,17 @@ from devcad.flatten.edges import closes_smoothly, smooth_edges
 from devcad.flatten.loops import Loop, Path
 from devcad.flatten.measure import deviation
 from devcad.flatten.pattern import Edge
-from devcad.flatten.trace import Trace, trace, turns, unit_tangents
+from devcad.flatten.trace import Trace, evaluate, trace, turns, unit_tangents
 from devcad.geometry.taylor import Array
 
 EXACT = 1e-9  # of a piece's size: design.md section 7, the scale of every "is it zero"
 NOISE = 2e-11  # of the edge's size: the accuracy of a pattern, 1e-9 mm per 100 mm, twice
 SHORTEST = 0.01  # mm; cutters stumble over shorter segments
+FINEST = 1e-12  # of an edge's size: no fit is asked to be nearer
 PER_ARC = 12.0  # nodes tried for each arc expected: more costs time, saves at most one arc in 20
+
+TRIES = ((1, SHORTEST), (2, SHORTEST), (1, 0.0), (2, 0.0), (4, 0.0), (8, 0.0))
+"""Times PER_ARC nodes, and least length of an arc: the tolerance comes before the length."""
 
 Keep = tuple[float | None, float | None]
 """Directions in radians to keep at the start and the end, None where they are free."""
@@ -36,11 +40,11 @@ Pieces = list[tuple[int, int, "Path | None"]]
 def fit_outline(outline: tuple[Edge, ...], tolerance: float) -> Loop:
     """A closed outline as lines and arcs, counterclockwise, within ``tolerance`` (mm).
 
-    Each edge is fitted by itself: straight lines and circular arcs are recognised, other
-    pieces become tangent continuous arcs, and edges that continue each other smoothly keep a
-    common tangent. Corners are the edges' first points; edges shorter than 1e-9 of the outline
-    are dropped. No arc sweeps more than half a turn, none is shorter than 0.01 mm unless its
-    edge is or the tolerance asks for it. ``deviation`` is measured on the true curves.
+    From corner to corner (``smooth_edges``) straight lines and circular arcs are recognised;
+    what is neither becomes the fewest tangent continuous arcs found. Every corner is a vertex;
+    edges shorter than 1e-9 of the outline are dropped. No arc sweeps more than half a turn, and
+    none is shorter than 0.01 mm unless its edge is or the tolerance asks for it.
+    ``deviation`` is measured on the true curves.
 
     Raises:
         CheckFailed: the tolerance cannot be kept (it is below the rounding of the numbers).
@@ -89,9 +93,10 @@ def traced_edges(outline: tuple[Edge, ...], tolerance: float) -> tuple[list[Trac
 
 def fit_trace(traced: Trace, tolerance: float, keep: Keep) -> Path:
     """A traced edge as lines and arcs, measured; see :func:`fit_edge`."""
-    aim = 0.99 * tolerance
     stretches = pieces(traced)
-    for _ in range(6):
+    aim, found = 0.99 * tolerance, FINEST * traced.size
+    exact = all(path is not None for _, _, path in stretches)
+    for _ in range(6 if exact or found < tolerance else 0):
         path = _join(traced, stretches, aim, keep)
         found = deviation(traced, path.points, path.bulges)
         if found <= tolerance or path.exact:
@@ -143,19 +148,20 @@ def _fit_free(
     traced: Trace, i: int, j: int, tolerance: float, start: float | None, end: float | None
 ) -> tuple[Array, Array]:
     """Points and bulges of the fewest arcs along samples i to j of a trace."""
-    short = bool(traced.s[j] - traced.s[i] <= SHORTEST)
     density = _density(traced, i, j, tolerance)
-    for attempt in range(7):
-        nodes = _nodes(traced, i, j, density, PER_ARC * 2.0**attempt)
-        for shortest in (
-            (SHORTEST, 0.0) if attempt == 6 and not short else (SHORTEST * (not short),)
-        ):
-            point, fine, angles = nodes
-            found = fewest_arcs(Nodes(point, fine, angles, start, end, tolerance, shortest))
-            if found is not None:
-                return _straightened(found, nodes[0], tolerance, start, end)
-    # Nothing smooth follows so closely: the samples themselves, which the tolerance placed.
-    return traced.points[i : j + 1], np.zeros(j - i)
+    short = traced.s[j] - traced.s[i] <= SHORTEST
+    for finer, shortest in TRIES:
+        if short and shortest > 0.0:
+            continue
+        points, fine, angles = _nodes(traced, i, j, density, PER_ARC * finer)
+        found = fewest_arcs(Nodes(points, fine, angles, start, end, tolerance, shortest))
+        if found is not None:
+            return _straightened(found, points, tolerance, start, end)
+    raise CheckFailed(
+        f"an outline has no smooth fit within {tolerance:.3g} mm",
+        limit=tolerance,
+        remedy="use a larger tolerance",
+    )
 
 
 def _straightened(
@@ -208,10 +214,10 @@ def _nodes(
         place = np.rint(density[knots - i] / density[-1] * count).astype(int)
         u[fine * np.clip(place, 1, count - 1)] = traced.u[knots]
         u = np.sort(u) if u[-1] >= u[0] else np.sort(u)[::-1]
-    points, slopes = traced.edge.curve(u)
+    points, slopes = evaluate(traced.edge, u)
     points = points.copy()
     points[0], points[-1] = traced.points[i], traced.points[j]
-    tangents, _ = unit_tangents(traced.edge, points, np.where(np.isfinite(slopes), slopes, 0.0))
+    tangents, _ = unit_tangents(traced.edge, points, slopes)
     return points, fine, np.arctan2(tangents[::fine, 1], tangents[::fine, 0])
 
 

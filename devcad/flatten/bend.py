@@ -9,23 +9,29 @@ import numpy as np
 from devcad.flatten.development import Development
 from devcad.flatten.fold import Folded, fold_chain
 from devcad.geometry import taylor
-from devcad.geometry.chain import Chain
+from devcad.geometry.chain import Chain, link
 from devcad.geometry.patch import Patch, RulingJet
 from devcad.geometry.taylor import Array
+
+STILL_CLOSED = 1e-6
+"""A hundredth of this, in mm, is how near the ends of a bent tube must be to be one ruling."""
 
 
 def bent(chain: Chain, developments: tuple[Development, ...], bend: float) -> Chain:
     """The chain with c -> bend * c and every crease to bend * its angle, isometric throughout.
 
-    The first ruling and its frame stay where they are. A tube opens. Source: geometry.md, 14.
+    The first ruling and its frame stay where they are. A tube opens, unless it is flat.
+    Source: geometry.md, 14.
     """
     first = chain.patches[0].frame([chain.patches[0].domain[0]])
     folded = fold_chain(developments, chain, first, bend)
+    patches = tuple(_bent(p, f, bend) for p, f in zip(chain.patches, folded, strict=True))
+    joined = link(patches, base_closed=False, tolerance=STILL_CLOSED)
     return replace(
         chain,
-        patches=tuple(_bent(p, f, bend) for p, f in zip(chain.patches, folded, strict=True)),
-        joints=tuple(replace(joint, angle=bend * joint.angle) for joint in chain.joints),
-        closing=None,
+        patches=patches,
+        joints=joined.joints,
+        closing=joined.closing if chain.closed else None,
     )
 
 

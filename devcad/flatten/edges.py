@@ -8,6 +8,7 @@ import numpy as np
 
 from devcad.flatten import loops
 from devcad.flatten.pattern import Edge, sample
+from devcad.flatten.trace import evaluate
 from devcad.geometry.taylor import Array
 
 DROPPED = 1e-9  # of the outline's size: a shorter edge is a corner
@@ -49,7 +50,7 @@ def _continues(before: Edge, after: Edge) -> bool:
 
 def _end_slope(edge: Edge, k: int) -> Array | None:
     """The derivative along the run at an end; None where it vanishes or does not exist."""
-    _, slopes = edge.curve(np.linspace(edge.u[0], edge.u[-1], 9))
+    _, slopes = evaluate(edge, np.linspace(edge.u[0], edge.u[-1], 9))
     speed = np.hypot(*slopes.T)
     if not speed[k] > 1e-9 * speed[1:-1].max():
         return None

@@ -46,6 +46,10 @@ class Loop:
         return np.roll(self.points, -1, axis=0)
 
 
+SPIKE = 0.3
+"""A corner within this of a half turn, in radians, is a spike."""
+
+
 def cross(a: Array, b: Array) -> Array:
     """a x b for vectors in the plane, (..., 2)."""
     return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
@@ -101,12 +105,12 @@ def perimeter(loop: Loop) -> float:
 def turning(loop: Loop) -> float:
     """How often the tangent turns round along the loop: +1 for a simple counterclockwise one.
 
-    nan where a corner turns back on itself, so that its sense is not defined.
+    nan where a corner turns back on itself: which way it does lies within the fit of its sides.
     """
     half = half_sweeps(loop.bulges)
     chord = np.arctan2(*(loop.ends - loop.points).T[::-1])
     corner = wrap(np.roll(chord - half, -1) - (chord + half))
-    if np.any(np.abs(corner) > np.pi - 1e-6):
+    if np.any(np.abs(corner) > np.pi - SPIKE):
         return float("nan")
     return float((2.0 * half.sum() + corner.sum()) / (2.0 * np.pi))
 

@@ -13,6 +13,7 @@ from devcad.geometry.taylor import Array
 
 START = 16  # first steps between two of the edge's u's
 LEVELS = 24  # halvings at most: 1e-8 of a step, below which a curve is a point of it
+ROUNDING = 1e-13  # of the coordinates: finer than that, samples are noise
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,6 +46,7 @@ def trace(edge: Edge, resolution: float) -> Trace:
     ends = np.asarray(edge.u, dtype=float)
     u = np.concatenate([(ends[:-1, None] + np.diff(ends)[:, None] * steps).ravel(), ends[-1:]])
     points, slopes = evaluate(edge, u)
+    resolution = max(resolution, ROUNDING * float(np.abs(points).max()))
     active = np.ones(len(u) - 1, dtype=bool)  # intervals not yet seen to be resolved
     for _ in range(LEVELS):
         left = np.flatnonzero(active)
@@ -85,7 +87,7 @@ def _misses(points: Array, tangents: Array, left: NDArray[np.intp], found: Array
 def evaluate(edge: Edge, u: Array) -> tuple[Array, Array]:
     """Points and derivatives; a derivative that does not exist counts as zero."""
     points, slopes = edge.curve(u)
-    return points, np.where(np.isfinite(slopes), slopes, 0.0)
+    return points, np.where(np.isfinite(slopes).all(axis=1, keepdims=True), slopes, 0.0)
 
 
 def _assemble(edge: Edge, u: Array, points: Array, slopes: Array) -> Trace:

@@ -152,7 +152,7 @@ def _crosses(polygon: Array) -> bool:
 def _batches(count: NDArray[np.intp], most: int = 2_000_000) -> list[NDArray[np.intp]]:
     """Rows in groups whose pairs fit the memory."""
     group = (np.cumsum(count) // most).astype(int)
-    return [np.flatnonzero(group == g) for g in np.unique(group)]
+    return [np.flatnonzero(group == g) for g in range(int(group[-1]) + 1)]
 
 
 def _side(a: Array, b: Array, p: Array) -> Array:

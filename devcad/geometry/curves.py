@@ -45,6 +45,7 @@ class Model(BaseModel):
     """What every table of a job file is: frozen, no unknown keys, no NaN, no infinity."""
 
     model_config = ConfigDict(
+        defer_build=True,  # a job uses one or two of the many kinds
         extra="forbid",
         frozen=True,
         allow_inf_nan=False,
@@ -378,5 +379,3 @@ CurveSpec = Annotated[
     Field(discriminator="kind"),
 ]
 """Any curve kind of a job file."""
-
-ChainCurve.model_rebuild()

@@ -11,14 +11,19 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from devcad.errors import GeometryError
-from devcad.geometry.taylor import Array
+from devcad.geometry.taylor import Array, rows_dot
 
 Curves = Callable[[Array], Array]
 """t (n,) -> points (n, k): several curves side by side, all columns in mm."""
+
+Indices = NDArray[np.integer[Any]]
 
 TWIST_LIMIT = np.radians(0.01)
 INSIDE = 1e-3  # where an edge has no tangent plane, twist counts from this fraction inside
@@ -28,8 +33,8 @@ MAX_SPANS = 4000
 _AIM = 0.9  # share of the tolerance that regrading aims at
 _GRADING = 1.7  # largest ratio of neighbouring spans: beyond it the twist stalls
 _ROUNDS = 24
-_PROBES = (np.arange(9) + 0.5) / 9.0  # places in a span where the error is measured
-_DENSE = (np.arange(32) + 0.5) / 32.0  # the same for the final certificate
+_PROBES: Array = np.linspace(0.0, 1.0, 11)  # places in a span where the error is measured
+_DENSE: Array = np.linspace(0.0, 1.0, 33)  # the same for the final certificate
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +99,7 @@ class Fit:
 @dataclass(frozen=True, slots=True)
 class Demand:
     """What a fit must reach: ``tolerance`` in mm for each of ``blocks`` (columns that are one
-    point), the twist limit for each of ``faces`` (pairs of blocks with rulings between), and
+    point), ``twist`` in radians for each of ``faces`` (pairs of blocks with rulings between), and
     ``gap_tolerance`` for the step between each of ``gaps`` (pairs of blocks across a thickness).
     """
 
@@ -104,6 +109,7 @@ class Demand:
     faces: tuple[tuple[slice, slice], ...] = ()
     gaps: tuple[tuple[slice, slice], ...] = ()
     gap_tolerance: float = np.inf
+    twist: float = TWIST_LIMIT
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,25 +131,25 @@ def fit(curves: Curves, course: Course, ends: Ends, demand: Demand) -> Fit:
         curves: points (n, k) at t (n,), k columns in mm.
         course: t against s, with the breaks.
     Returns:
-        the fit with its error and twist, measured at 32 places per span.
+        the fit with its error and twist, measured at 33 places per span.
     Raises:
         GeometryError: not reached with 4000 spans, or the curves are not numbers.
     """
     first = max(4 // (len(course.s) - 1), 1) + 1
-    knots = np.unique(np.concatenate([np.linspace(a, b, first) for a, b in _pairs(course.s)]))
+    knots = np.unique(np.concatenate([np.linspace(a, b, first) for a, b in pairwise(course.s)]))
     best: Fit | None = None
     tries = 0
     worst = np.inf
     for _ in range(_ROUNDS):
         spline = _least_squares(curves, course, knots, ends, demand.degree)
         error, twist = _measure(spline, curves, course, knots, demand, _PROBES)
-        worst = float(max(error.max() / demand.tolerance, twist.max() / TWIST_LIMIT))
+        worst = float(max(error.max() / demand.tolerance, twist.max() / demand.twist))
         if worst <= 1.0:
             tries += 1
             done = _certified(spline, curves, course, knots, demand)
             if done is not None and (best is None or len(spline.poles) < len(best.spline.poles)):
                 best = done
-        size = _wanted_sizes(knots, error / demand.tolerance, twist / TWIST_LIMIT, demand.degree)
+        size = _wanted_sizes(knots, error / demand.tolerance, twist / demand.twist, demand.degree)
         if worst > 1.0:  # errors spread to neighbours: without a push the rounds may swing
             size *= min(1.0, float(np.sum(np.diff(knots) / size)) / len(knots))
         finer = _regraded(knots, course.s, size)
@@ -174,13 +180,13 @@ def ruled_twist(start: Array, slope: Array, end: Array, end_slope: Array) -> Arr
     length = np.linalg.norm(ruling, axis=1)
     real = length > FLOOR * max(float(length.max(initial=0.0)), np.finfo(float).tiny)
     d = ruling / np.where(real, length, 1.0)[:, None]
-    p = slope - _rows(slope, d)[:, None] * d
-    q = end_slope - _rows(end_slope, d)[:, None] * d
+    p = slope - rows_dot(slope, d)[:, None] * d
+    q = end_slope - rows_dot(end_slope, d)[:, None] * d
     size_p, size_q = np.linalg.norm(p, axis=1), np.linalg.norm(q, axis=1)
     inner_p = np.where((size_p < INSIDE * size_q)[:, None], p + INSIDE * (q - p), p)
     inner_q = np.where((size_q < INSIDE * size_p)[:, None], q + INSIDE * (p - q), q)
     real &= np.maximum(size_p, size_q) > FLOOR * float(np.maximum(size_p, size_q).max(initial=0.0))
-    turn = np.arctan2(_rows(d, np.cross(inner_p, inner_q)), _rows(inner_p, inner_q))
+    turn = np.arctan2(rows_dot(d, np.cross(inner_p, inner_q)), rows_dot(inner_p, inner_q))
     return np.where(real, np.abs(turn), 0.0)
 
 
@@ -189,7 +195,7 @@ def _certified(
 ) -> Fit | None:
     """The fit with its densely measured figures, or None where they exceed the demand."""
     error, twist = _measure(spline, curves, course, knots, demand, _DENSE)
-    if error.max() > demand.tolerance or twist.max() > TWIST_LIMIT:
+    if error.max() > demand.tolerance or twist.max() > demand.twist:
         return None
     return Fit(spline, course, float(error.max()), float(twist.max()))
 
@@ -199,14 +205,12 @@ def _measure(
 ) -> tuple[Array, Array]:
     """The largest error and twist in every span, (spans,) each, at the given places in it."""
     s = (knots[:-1, None] + np.diff(knots)[:, None] * places).ravel()
-    fitted, true = spline(s), curves(course(s))
-    off = fitted - true
+    fitted = spline(s)
+    off = fitted - _points(curves, course, s)
     error = np.max([np.linalg.norm(off[:, b], axis=1) for b in demand.blocks], axis=0)
     for a, b in demand.gaps:  # in proportion, so that one tolerance speaks for both
         step = np.linalg.norm(off[:, a] - off[:, b], axis=1)
         error = np.maximum(error, step * (demand.tolerance / demand.gap_tolerance))
-    if not np.isfinite(error).all():
-        raise GeometryError("the edges of the surface are not finite numbers")
     twist = np.zeros(s.size)
     if demand.faces:
         slope = spline.derivative(s)
@@ -215,6 +219,14 @@ def _measure(
             twist = np.maximum(twist, turn)
     shape = (len(knots) - 1, places.size)
     return error.reshape(shape).max(axis=1), twist.reshape(shape).max(axis=1)
+
+
+def _points(curves: Curves, course: Course, s: Array) -> Array:
+    """The true points at s, all of them numbers."""
+    points = curves(course(s))
+    if not np.isfinite(points).all():
+        raise GeometryError("the edges of the surface are not finite numbers")
+    return points
 
 
 def _wanted_sizes(knots: Array, error: Array, twist: Array, degree: int) -> Array:
@@ -238,7 +250,7 @@ def _regraded(knots: Array, breaks: Array, size: Array) -> Array:
     """New distinct knots of the given sizes (one for each old span) between the breaks."""
     amount = np.concatenate([[0.0], np.cumsum(np.diff(knots) / size)])
     pieces = []
-    for a, b in _pairs(breaks):
+    for a, b in pairwise(breaks):
         low, high = np.interp([a, b], knots, amount)
         n = max(int(np.ceil(high - low - 1e-9)), 1)
         inner = np.interp(np.linspace(low, high, n + 1)[1:-1], amount, knots)
@@ -265,7 +277,7 @@ def _least_squares(
         s = distinct[:-1, None] + np.diff(distinct)[:, None] * nodes
         centre = poles[0].copy()  # normal equations lose digits far from the origin
         shifted = Spline(degree, knots, np.where(_held(count, held), poles - centre, 0.0))
-        target = curves(course(s.ravel())) - centre - shifted(s.ravel())
+        target = _points(curves, course, s.ravel()) - centre - shifted(s.ravel())
         poles[free] = centre + _normal_equations(knots, degree, s, target, free)
     return Spline(degree, knots, poles)
 
@@ -289,7 +301,7 @@ def _normal_equations(knots: Array, degree: int, s: Array, target: Array, free: 
     return np.asarray(solveh_banded(band[:, free], load[free]))
 
 
-def _basis(knots: Array, degree: int, span: Array, s: Array) -> Array:
+def _basis(knots: Array, degree: int, span: Indices, s: Array) -> Array:
     """The degree + 1 basis functions that live on the knot span, (n, degree + 1)."""
     out = np.ones((s.size, 1))
     for j in range(1, degree + 1):
@@ -319,11 +331,3 @@ def _held(count: int, held: int) -> Array:
 
 def _distinct(knots: Array) -> Array:
     return np.unique(knots)
-
-
-def _pairs(x: Array) -> zip[tuple[float, float]]:
-    return zip(x[:-1], x[1:], strict=True)
-
-
-def _rows(x: Array, y: Array) -> Array:
-    return np.asarray(np.einsum("ij,ij->i", x, y))

@@ -46,7 +46,8 @@ class Clearance:
     """How a sheet stands to its regression curve.
 
     ``value`` is the smallest distance in mm along a ruling from the sheet (all its layers) to
-    where that layer becomes singular: negative when it is crossed, 0 when touched, inf when
+    where that layer becomes singular (on a cylinder: along the normal, to its centre of
+    curvature, when that is crossed): negative when it is crossed, 0 when touched, inf when
     there is no regression curve. ``t``, ``v`` say where; ``touches`` that an end of the extent
     lies on the regression curve of the reference surface, and nothing is crossed. A value of 0
     that does not touch is a ruling that is singular all along, or where the front turns over.
@@ -108,9 +109,11 @@ def clearance(patch: Patch, layers: tuple[float, ...], *, to_apex: bool = False)
         low = layered.min(axis=(0, 1))
         # a ruling whose direction does not turn has its regression point at infinity
         turns = np.abs(frame.a) * (np.abs(ends).max(axis=0) + 1.0) > 1e-14 * scale
-        with np.errstate(divide="ignore", invalid="ignore"):
-            distance = np.where(turns, low / np.abs(frame.a), np.copysign(np.inf, low))
-        distance = np.where(low <= 0.0, np.where(turns, distance, low / (scale + 1e-300)), distance)
+        # where the ruling does not turn, only the bending can make a layer singular: then the
+        # distance is how far the layer's centre of curvature is from it
+        with np.errstate(all="ignore"):
+            bends = np.where(low > 0.0, np.inf, low / np.abs(frame.c))
+            distance = np.where(turns, low / np.abs(frame.a), bends)
         distance = np.where(low == 0.0, 0.0, distance)
         return np.where(np.isnan(low), -np.inf, distance), ends[0]
 
@@ -255,7 +258,7 @@ def _edge_point(patch: Patch, t: float) -> Array | None:
 def _nearest_edge_point(patch: Patch, t: Array) -> Singularity | None:
     """The cuspidal edge where it comes nearest to the extent."""
     frame = patch.frame(t)
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(all="ignore"):
         v = -frame.q / frame.a
         gap = np.maximum(np.maximum(frame.v_from - v, v - frame.v_to), 0.0)
     best = int(np.nanargmin(np.where(np.isfinite(gap), gap, np.inf)))

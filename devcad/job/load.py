@@ -21,7 +21,7 @@ from devcad.importers.table import parse_points
 from devcad.importers.toml import parse_toml
 from devcad.job.invalid import below, problems, raise_all, shown, unknown_kind
 from devcad.job.recipe import RecipeTable
-from devcad.job.tables import JobTable, PlaceTable
+from devcad.job.tables import JobTable, MetaTable, PlaceTable
 from devcad.units import MM_PER_UNIT
 
 MAX_JOB_BYTES = 256_000
@@ -50,6 +50,7 @@ class JobPanel:
     """A surface of the job, still in the job's units, with its name and its place (4, 4) in mm."""
 
     name: str
+    kind: str
     surface: Surface
     place: Array | None
 
@@ -58,8 +59,9 @@ class JobPanel:
 class Job:
     """A job file, checked. Lengths are mm; only the surfaces wait for ``mm_per_unit``.
 
-    ``single`` says that it has [surface] and not [[panel]]; ``path`` is as the user gave it; ``sha256`` is that of the job file's bytes followed by those
-    of the files it names, in their order. ``pipeline`` None leaves the choice to the caller.
+    ``single`` says that it has [surface] and not [[panel]]. ``path`` is as the user gave it.
+    ``sha256`` is that of the job file's bytes followed by those of the files it names, in their
+    order. ``pipeline`` None leaves the choice to the caller.
     """
 
     name: str
@@ -129,21 +131,18 @@ def _inline_points(table: dict[str, Any], folder: Path, place: str) -> bytes:
 
 def _job(tree: dict[str, Any], place: str, sha256: str) -> Job:
     """The Job of a tree; all its problems at once."""
-    raise_all(_too_large(tree, place))
+    _refuse_too_large(tree, place)
     table, found = _validated(JobTable, tree, place, {})
     scale = MM_PER_UNIT.get(str(tree.get("units", "mm")), 1.0)
-    surfaces: list[Surface] = []
+    surfaces: list[tuple[str, Surface]] = []
     for inner, where in _surface_tables(tree, place):
         surface, wrong = _surface(inner, where, scale)
         found += wrong
-        surfaces += [surface] if surface is not None else []
+        surfaces += [(inner["kind"], surface)] if surface is not None else []
     raise_all(sorted(found, key=lambda error: -error.code))  # a limit tells more than a typo
     assert table is not None  # raise_all spoke otherwise
     names = [panel.name for panel in table.panel or ()] or [table.name]
     places = [panel.place for panel in table.panel or ()] or [table.place]
-    meta = table.meta.model_dump()
-    if table.meta.grain is not None:
-        meta["grain"] = math.radians(table.meta.grain)
     return Job(
         name=table.name,
         path=place,
@@ -155,27 +154,44 @@ def _job(tree: dict[str, Any], place: str, sha256: str) -> Job:
         material=table.material,
         pipeline=table.pipeline,
         bend=table.bend,
-        meta=Meta(**meta),
+        meta=_meta(table.meta),
         recipe=table.recipe,
         single=table.surface is not None,
         panels=tuple(
-            JobPanel(name, surface, _matrix(where, scale, place))
-            for name, surface, where in zip(names, surfaces, places, strict=True)
+            JobPanel(name, kind, surface, _matrix(where, scale, place))
+            for name, (kind, surface), where in zip(names, surfaces, places, strict=True)
         ),
     )
 
 
-def _too_large(node: Any, place: str) -> list[DevcadError]:
-    """One error for each finite number that no part has."""
-    if isinstance(node, dict):
-        return [e for key, value in node.items() for e in _too_large(value, below(place, key))]
-    if isinstance(node, list):
-        return [e for k, value in enumerate(node) for e in _too_large(value, f"{place}[{k}]")]
-    if type(node) not in (int, float) or not LARGEST < abs(node) < math.inf:
-        return []
-    what = f"{shown(node)} is larger than any part: at most {LARGEST:g}"
+def _meta(table: MetaTable) -> Meta:
+    """The same, in radians."""
+    keys = table.model_dump()
+    if table.grain is not None:
+        keys["grain"] = math.radians(table.grain)
+    return Meta(**keys)
+
+
+def _refuse_too_large(tree: dict[str, Any], place: str) -> None:
+    """JobError for each finite number that no part has."""
     remedy = "give a smaller number, in larger units"
-    return [JobError(what, place, "", shown(node), LARGEST, remedy)]
+    found = []
+    for path, value in _too_large(tree):
+        what = f"{shown(value)} is larger than any part: at most {LARGEST:g}"
+        found.append(JobError(what, below(place, path), "", shown(value), LARGEST, remedy))
+    raise_all(found)
+
+
+def _too_large(node: Any) -> Iterator[tuple[str, int | float]]:
+    """The finite numbers beyond ``LARGEST`` with their paths."""
+    named = isinstance(node, dict)
+    for key, value in node.items() if named else enumerate(node):
+        if isinstance(value, dict | list):
+            for path, number in _too_large(value):
+                separator = "" if path.startswith("[") else "."
+                yield f"{key if named else f'[{key}]'}{separator}{path}", number
+        elif type(value) in (int, float) and LARGEST < abs(value) < math.inf:
+            yield str(key) if named else f"[{key}]", value
 
 
 def _surface_tables(tree: dict[str, Any], place: str) -> Iterator[tuple[Any, str]]:

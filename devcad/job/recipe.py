@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
-from devcad.checks import CHECKS
+from devcad.checks import NAMES
 from devcad.errors import JobError
 from devcad.export import FORMATS, Options
 from devcad.importers.files import decode, read_bytes
@@ -31,7 +31,7 @@ def known_formats(names: list[str]) -> list[str]:
 
 def known_checks(names: list[str]) -> list[str]:
     """The names, each once and in the order given; JobError where one is no check."""
-    return _known(names, CHECKS, "check")
+    return _known(names, NAMES, "check")
 
 
 def _known(names: list[str], known: Iterable[str], noun: str) -> list[str]:

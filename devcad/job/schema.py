@@ -16,7 +16,7 @@ def job_schema() -> dict[str, Any]:
     Conditions between keys (either [surface] or [[panel]], names that differ) are not in it.
     """
     panel = create_model("PanelTable", __base__=PanelTable, surface=(SurfaceSpec, ...))
-    panels = Annotated[list[panel], Field(min_length=1)] | None  # type: ignore[valid-type]
+    panels = Annotated[list[panel], Field(min_length=1)] | None
     job = create_model(
         "JobTable", __base__=JobTable, surface=(SurfaceSpec | None, None), panel=(panels, None)
     )

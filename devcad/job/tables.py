@@ -10,6 +10,7 @@ from pydantic import AfterValidator, Field, model_validator
 from devcad.errors import JobError
 from devcad.geometry.curves import Count, Direction, Model, Number, Positive, Vector
 from devcad.job.recipe import RecipeTable
+from devcad.shop.materials import material
 
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
 _DEVICES = re.compile(r"(?:con|prn|aux|nul|com[0-9]|lpt[0-9])(?:\..*)?", re.IGNORECASE)
@@ -25,6 +26,12 @@ def _file_name(value: str) -> str:
             remedy="use up to 64 letters, digits, dots, dashes and underscores",
         )
     return value
+
+
+def _material(value: str) -> str:
+    """The name of a material in the library, in lower case."""
+    material(value)
+    return value.lower()
 
 
 Text = Annotated[str, Field(strict=True, max_length=1000)]
@@ -70,7 +77,7 @@ class JobTable(Model):
     tolerance: Positive | None = Field(None, description="default 0.05 mm")
     thickness: NonNegative = 0.0
     reference: Literal["middle", "front", "back"] = "middle"
-    material: Text | None = None
+    material: Annotated[str, Field(strict=True), AfterValidator(_material)] | None = None
     pipeline: Text | None = None
     bend: Annotated[float, Field(strict=True, ge=0.0, le=1.0)] = 1.0
     meta: MetaTable = MetaTable()

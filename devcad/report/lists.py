@@ -4,19 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from pydantic import BaseModel
-
 from devcad.export import FORMATS
 from devcad.geometry.constructions import SURFACES
 from devcad.geometry.curves import CurveSpec
 from devcad.job.invalid import kind_of, models_in
 from devcad.job.recipe import recipe_names
-from devcad.shop.materials import MATERIALS
+from devcad.shop.materials import load
 
 Rows = dict[str, str]
 
 
-def _first_line(model: type[BaseModel]) -> str:
+def _first_line(model: type[object]) -> str:
     """The first line of a model's docstring."""
     return (model.__doc__ or "").strip().split("\n")[0]
 
@@ -34,7 +32,7 @@ def _formats() -> Rows:
 
 
 def _materials() -> Rows:
-    return {name: material.title for name, material in MATERIALS.items()}
+    return {name: material.title for name, material in load().items()}
 
 
 LISTS: dict[str, Callable[[], Rows]] = {

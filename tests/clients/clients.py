@@ -60,26 +60,30 @@ def run(command: Sequence[str | Path], **environment: str) -> str:
     return done.stdout.decode(errors="replace")
 
 
-def answer(printed: str, out: Path) -> Facts:
-    """The JSON object that a client wrote to ``out``; its absence fails with what was printed."""
-    assert out.is_file(), f"the client wrote no answer:\n{printed[-2000:]}"
-    facts: Facts = json.loads(out.read_text())
-    return facts
-
-
 def freecad(files: Sequence[Path], out: Path) -> Facts:
-    """FreeCAD's view of STEP and DXF files by path, all in one start of the program."""
+    """FreeCAD's view of STEP, DXF and SVG files by path, all in one start of the program.
+
+    A file that crashes it has an entry "error", and another start reads the files after it.
+    """
     words = (program("freecadcmd"), HERE / "freecad_macro.py")
-    listing = out.with_suffix(".list")
-    listing.write_text("\n".join(map(str, files)))
-    printed = run(words, DEVCAD_FILES=str(listing), DEVCAD_ANSWER=str(out))
-    return answer(printed, out)
+    listing, facts = out.with_suffix(".list"), Facts()
+    while rest := [str(file) for file in files if str(file) not in facts]:
+        listing.write_text("\n".join(rest))
+        out.write_text("")
+        printed = run(words, DEVCAD_FILES=str(listing), DEVCAD_ANSWER=str(out))
+        facts |= dict(json.loads(line) for line in out.read_text().splitlines())
+        for file in [file for file in rest if file not in facts][:1]:
+            facts[file] = {"error": f"FreeCAD crashed:\n{printed[-2000:]}"}
+    return facts
 
 
 def node(files: Sequence[Path], out: Path) -> Facts:
     """What the npm clients say about STEP, DXF, STL and GLB files, by path."""
     words = (program("node"), HERE / "node_clients.cjs", node_packages(), out)
-    return answer(run([*words, *files]), out)
+    printed = run([*words, *files])
+    assert out.is_file(), f"the clients wrote no answer:\n{printed[-2000:]}"
+    facts: Facts = json.loads(out.read_text())
+    return facts
 
 
 def prusa_slicer(file: Path) -> dict[str, str]:

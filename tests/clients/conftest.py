@@ -1,8 +1,10 @@
-"""Every sample exported once a session, and opened once by each client that reads many files."""
+"""Every job exported once a session, and opened once by each client that reads many files."""
 
 from __future__ import annotations
 
 import json
+import re
+import shutil
 from pathlib import Path
 
 import clients
@@ -11,35 +13,76 @@ from exported import Exported, Look
 
 import devcad
 
-SAMPLES = sorted((clients.REPOSITORY / "samples").glob("*.toml"))
+SAMPLES = clients.REPOSITORY / "samples"
+
+PAIR = """
+name = "pair"
+thickness = 1.5
+[[panel]]
+name = "lid"
+[panel.surface]
+kind = "frustum"
+radius = 80
+top_radius = 20
+height = 45
+[panel.place]
+origin = [0, 0, 100]
+z_axis = [0, 0, 1]
+x_axis = [0, 1, 0]
+[[panel]]
+name = "wall"
+[panel.surface]
+kind = "cylinder"
+radius = 80
+sweep = 270
+length = 90
+"""
+
+
+def _jobs() -> dict[str, str]:
+    """Every sample, the thick ones as surfaces without thickness too, and a part of two panels."""
+    jobs = {path.stem: path.read_text() for path in sorted(SAMPLES.glob("*.toml"))}
+    sheets = {
+        f"{name}-sheet": re.sub(r"^thickness *=.*$", "", text, flags=re.MULTILINE)
+        for name, text in jobs.items()
+        if "\nthickness" in text
+    }
+    return jobs | sheets | {"pair": PAIR}
+
+
+JOBS = _jobs()
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
-    if "sample" in metafunc.fixturenames:
-        metafunc.parametrize("sample", [path.stem for path in SAMPLES])
+    if "job" in metafunc.fixturenames:
+        metafunc.parametrize("job", JOBS)
 
 
 @pytest.fixture(scope="session")
 def exports(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Exported | Exception]:
-    """All samples by file name; a sample that does not build fails its own tests only."""
-    out = tmp_path_factory.mktemp("out")
+    """All jobs by name; one that does not build fails its own tests only."""
+    home = tmp_path_factory.mktemp("jobs")
+    for table in SAMPLES.glob("*.csv"):
+        shutil.copy(table, home)
 
-    def export(job: Path) -> Exported | Exception:
+    def export(name: str, text: str) -> Exported | Exception:
+        job = home / f"{name}.toml"
+        job.write_text(text)
         try:
             part = devcad.build(job)
-            devcad.export(part, out)
+            devcad.export(part, home / name)
         except Exception as problem:
             return problem
-        folder = out / part.name
+        folder = home / name / part.name
         report = json.loads((folder / "report.json").read_text())
         return Exported(folder, report, part.thickness, part.tolerance)
 
-    return {job.stem: export(job) for job in SAMPLES}
+    return {name: export(name, text) for name, text in JOBS.items()}
 
 
 @pytest.fixture
-def exported(sample: str, exports: dict[str, Exported | Exception]) -> Exported:
-    found = exports[sample]
+def exported(job: str, exports: dict[str, Exported | Exception]) -> Exported:
+    found = exports[job]
     if isinstance(found, Exception):
         raise found
     return found
@@ -63,15 +106,15 @@ def _looker(facts: clients.Facts) -> Look:
 def in_freecad(
     exports: dict[str, Exported | Exception], tmp_path_factory: pytest.TempPathFactory
 ) -> Look:
-    """FreeCAD's view of a STEP or DXF file of any sample."""
-    answer = tmp_path_factory.mktemp("freecad") / "answer.json"
-    return _looker(clients.freecad(_every(exports, "step", "dxf"), answer)["files"])
+    """FreeCAD's view of a STEP, DXF or SVG file of any job."""
+    answer = tmp_path_factory.mktemp("freecad") / "answers"
+    return _looker(clients.freecad(_every(exports, "step", "dxf", "svg"), answer))
 
 
 @pytest.fixture(scope="session")
 def in_node(
     exports: dict[str, Exported | Exception], tmp_path_factory: pytest.TempPathFactory
 ) -> Look:
-    """The view of the JavaScript clients of any file of any sample."""
+    """The view of the JavaScript clients of any file of any job."""
     answer = tmp_path_factory.mktemp("node") / "answer.json"
     return _looker(clients.node(_every(exports, "step", "dxf", "stl", "glb"), answer))

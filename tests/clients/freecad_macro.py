@@ -1,7 +1,8 @@
-"""Runs inside FreeCAD (any Python 3): opens the listed STEP and DXF files, writes what it saw.
+"""Runs inside FreeCAD (any Python 3): opens the listed STEP, DXF and SVG files, writes what it saw.
 
 The file list and the answer's path come by environment variables, because freecadcmd opens its
-arguments as documents; its exit code is always 0, so the answer is the only sign of life.
+arguments as documents. Each answer is a line [file, facts], written at once: a file that crashes
+FreeCAD is the first one without a line.
 """
 
 import json
@@ -11,6 +12,7 @@ from pathlib import Path
 
 import FreeCAD
 import Import
+import importSVG
 import Part
 
 
@@ -22,6 +24,9 @@ def step_facts(path):
         boolean_check = "ok"
     except Exception as problem:
         boolean_check = str(problem)
+    # By default its 0.20 without a window crashes on every assembly, its own kernel's too.
+    settings = FreeCAD.ParamGet("User parameter:BaseApp/Preferences/Mod/Import/hSTEP")
+    settings.SetBool("ReadShapeCompoundMode", False)
     document = FreeCAD.newDocument()
     Import.insert(path, document.Name)
     labels = [thing.Label for thing in document.Objects]
@@ -60,14 +65,29 @@ def dxf_facts(path):
     return {"layers": layers}
 
 
+def svg_facts(path):
+    document = FreeCAD.newDocument()
+    importSVG.insert(path, document.Name)
+    shapes = [thing.Shape for thing in document.Objects if hasattr(thing, "Shape")]
+    outline = max(shapes, key=lambda shape: shape.Length)
+    box = outline.BoundBox
+    facts = {"outline": {"length": outline.Length, "size": [box.XLength, box.YLength]}}
+    FreeCAD.closeDocument(document.Name)
+    return facts
+
+
+READERS = {".step": step_facts, ".dxf": dxf_facts, ".svg": svg_facts}
+
+
 def facts(path):
     try:
-        return dxf_facts(path) if path.lower().endswith(".dxf") else step_facts(path)
+        return READERS[Path(path).suffix.lower()](path)
     except Exception:
         return {"error": traceback.format_exc()}
 
 
-files = Path(os.environ["DEVCAD_FILES"]).read_text().split("\n")
-seen = {"version": FreeCAD.Version()[:3], "files": {f: facts(f) for f in files}}
-Path(os.environ["DEVCAD_ANSWER"]).write_text(json.dumps(seen))
+with Path(os.environ["DEVCAD_ANSWER"]).open("a") as answer:
+    for file in Path(os.environ["DEVCAD_FILES"]).read_text().split("\n"):
+        answer.write(json.dumps([file, facts(file)]) + "\n")
+        answer.flush()
 os._exit(0)  # at once: nothing is saved, not even the import settings made above

@@ -6,6 +6,7 @@ Pattern and mesh are empty but for the exact area, which is all that STEP reads 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -121,7 +122,10 @@ def frustum(
 
 
 def mitred_pipe(
-    radius: float = 40.0, length: float = 150.0, slope: float = 0.7, sweep: float = TURN,
+    radius: float = 40.0,
+    length: float = 150.0,
+    slope: float = 0.7,
+    sweep: float = TURN,
     thickness: float = 0.0,
 ) -> Panel:
     """A pipe whose upper end is cut by a plane: v_to = length + slope x."""
@@ -145,7 +149,10 @@ def mitred_pipe(
 
 
 def elliptic_cylinder(
-    a: float = 60.0, b: float = 35.0, height: float = 80.0, sweep: float = TURN,
+    a: float = 60.0,
+    b: float = 35.0,
+    height: float = 80.0,
+    sweep: float = TURN,
     thickness: float = 0.0,
 ) -> Panel:
     def base(x: Array) -> Array:
@@ -166,8 +173,12 @@ def elliptic_cylinder(
 
 
 def elliptic_cone(
-    a: float = 60.0, b: float = 35.0, rise: float = 90.0, fractions: tuple[float, float] = (0.3, 1.0),
-    domain: tuple[float, float] = (0.0, TURN), thickness: float = 0.0,
+    a: float = 60.0,
+    b: float = 35.0,
+    rise: float = 90.0,
+    fractions: tuple[float, float] = (0.3, 1.0),
+    domain: tuple[float, float] = (0.0, TURN),
+    thickness: float = 0.0,
 ) -> Panel:
     """The cone over an ellipse in z = 0 with its apex at (10, 5, rise); the extent runs over
     fractions of the way from the apex to the ellipse."""
@@ -188,9 +199,7 @@ def elliptic_cone(
     sector = 0.5 * np.linalg.norm(np.cross(jet[0], jet[1]), axis=1)
     whole = 0.5 * (domain[1] - domain[0]) * weights @ sector
     return panel(
-        patch(
-            lambda x: constant(x, apex), arm, height(fractions[0]), height(fractions[1]), domain
-        ),
+        patch(lambda x: constant(x, apex), arm, height(fractions[0]), height(fractions[1]), domain),
         shapes=(Shape("cone", apex),),
         area=float(whole * (fractions[1] ** 2 - fractions[0] ** 2)),
         thickness=thickness,
@@ -199,8 +208,11 @@ def elliptic_cone(
 
 
 def helix_strip(
-    radius: float = 30.0, rise: float = 12.0, extent: tuple[float, float] = (20.0, 60.0),
-    turns: float = 1.0, thickness: float = 0.0,
+    radius: float = 30.0,
+    rise: float = 12.0,
+    extent: tuple[float, float] = (20.0, 60.0),
+    turns: float = 1.0,
+    thickness: float = 0.0,
 ) -> Panel:
     """The tangent surface of a helix; ``rise`` per radian."""
 
@@ -238,8 +250,12 @@ def quad(corners: Array) -> tuple[Patch, Shape, float]:
 
 
 def hopper(
-    base: float = 100.0, top: float = 60.0, height: float = 80.0, thickness: float = 0.0,
-    sides: int = 4, closed: bool = True,
+    base: float = 100.0,
+    top: float = 60.0,
+    height: float = 80.0,
+    thickness: float = 0.0,
+    sides: int = 4,
+    closed: bool = True,
 ) -> Panel:
     """The sides of a truncated square pyramid: planes around a square, creases between."""
     angle = TURN * (np.arange(5) + 0.5) / 4.0
@@ -257,7 +273,9 @@ def hopper(
     )
 
 
-def plate(radii: tuple[float, float] = (30.0, 80.0), sweep: float = TURN, thickness: float = 0.0) -> Panel:
+def plate(
+    radii: tuple[float, float] = (30.0, 80.0), sweep: float = TURN, thickness: float = 0.0
+) -> Panel:
     """A plane ring, or the sector of one."""
 
     def ruling(x: Array) -> Array:
@@ -271,4 +289,92 @@ def plate(radii: tuple[float, float] = (30.0, 80.0), sweep: float = TURN, thickn
         area=area,
         thickness=thickness,
         closing=CLOSED if sweep == TURN else None,
+    )
+
+
+def rounded_box(
+    a: float = 50.0,
+    b: float = 30.0,
+    corner: float = 10.0,
+    height: float = 40.0,
+    thickness: float = 0.0,
+) -> Panel:
+    """The walls of an upright box with round corners as one patch, by arc length; it starts at
+    a corner's end, so that no side is cut in two. Counterclockwise from above, front outside."""
+    quarter = 0.5 * np.pi * corner
+    sides = [2.0 * (a - corner), 2.0 * (b - corner)] * 2
+    pieces: list[tuple[float, Array, float, float]] = []  # start, point, direction, curvature
+    at, point, along = 0.0, np.array([corner - a, -b]), 0.0
+    for side in sides:
+        ahead = np.array([np.cos(along), np.sin(along)])
+        left = np.array([-ahead[1], ahead[0]])
+        pieces += [(at, point, along, 0.0), (at + side, point + side * ahead, along, 1.0 / corner)]
+        point = point + (side + corner) * ahead + corner * left
+        at, along = at + side + quarter, along + 0.5 * np.pi
+    borders = np.array([p[0] for p in pieces])
+
+    def base(x: Array) -> Array:
+        out = np.zeros((*x.shape, 3))
+        which = np.searchsorted(borders[1:], x[0], side="right")
+        for k, (begin, origin, angle, bend) in enumerate(pieces):
+            s = x[:, which == k].copy()
+            s[0] -= begin
+            turned = bend * s
+            turned[0] += angle
+            sine, cosine = taylor.sin_cos(turned)
+            if bend:
+                run = vector(sine / bend, -cosine / bend, 0.0 * s)
+                run[0, :, :2] += np.array([-np.sin(angle), np.cos(angle)]) / bend
+            else:
+                run = vector(s * np.cos(angle), s * np.sin(angle), 0.0 * s)
+            run[0, :, :2] += origin
+            out[:, which == k] = run
+        return out
+
+    axis = np.array([0.0, 0.0, 1.0])
+    girth = sum(sides) + 4.0 * quarter
+    return panel(
+        patch(base, lambda x: constant(x, axis), 0.0, height, (0.0, girth), tuple(borders[1:])),
+        shapes=(Shape("cylinder", axis=axis),),
+        area=girth * height,
+        thickness=thickness,
+        closing=CLOSED,
+    )
+
+
+def moebius(radius: float = 50.0, width: float = 10.0) -> Panel:
+    """A band whose ruling comes back reversed (it twists: no developable, but a good shape)."""
+
+    def base(x: Array) -> Array:
+        s, c = taylor.sin_cos(x)
+        return vector(radius * c, radius * s, constant(x, 0.0))
+
+    def ruling(x: Array) -> Array:
+        s, c = taylor.sin_cos(x)
+        half_s, half_c = taylor.sin_cos(0.5 * x)
+        return vector(taylor.mul(half_c, c), taylor.mul(half_c, s), half_s)
+
+    return panel(
+        patch(base, ruling, -width, width, (0.0, TURN)),
+        shapes=(Shape("tangent"),),
+        area=1.0,
+        closing=CLOSED,
+        orientable=False,
+    )
+
+
+def scaled(made: Panel, factor: float) -> Panel:
+    """The panel, its shapes, thickness and area scaled about the origin."""
+    shapes = tuple(
+        replace(
+            s,
+            point=None if s.point is None else factor * s.point,
+            radius=None if s.radius is None else factor * s.radius,
+        )
+        for s in made.shapes
+    )
+    chain = replace(made.chain, patches=tuple(p.scaled(factor) for p in made.chain.patches))
+    pattern = replace(made.pattern, area=made.pattern.area * factor**2)
+    return replace(
+        made, chain=chain, shapes=shapes, thickness=made.thickness * factor, pattern=pattern
     )

@@ -1,4 +1,4 @@
-"""DXF patterns as a shop's programs see them: one closed contour of the reported size."""
+"""Patterns as a shop's programs see them: one closed contour of the reported size."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def test_the_contour_encloses_the_reported_flat_area(exported: Exported) -> None
     for path, panel in zip(exported.files("dxf"), exported.panels, strict=True):
         x, y = _contour(path).T
         area = 0.5 * np.sum(x * np.roll(y, -1) - y * np.roll(x, -1))
-        allowed = (exported.deviation("dxf") + FLATTENED) * panel["cut_length"]
+        allowed = _distance(exported, panel) * panel["cut_length"]
         assert area == pytest.approx(panel["flat_area"], abs=allowed)
 
 
@@ -66,18 +66,18 @@ def test_the_contour_fills_the_reported_box(exported: Exported) -> None:
     for path, panel in zip(exported.files("dxf"), exported.panels, strict=True):
         points = _contour(path)
         box = [*points.min(axis=0), *points.max(axis=0)]
-        allowed = exported.deviation("dxf") + FLATTENED
+        allowed = _distance(exported, panel)
         np.testing.assert_allclose(box, panel["flat_bbox"], rtol=0, atol=allowed)
 
 
 def test_reference_lines_stay_on_the_panel(exported: Exported) -> None:
     from shapely import LineString, Polygon
 
-    for path in exported.files("dxf"):
-        panel = Polygon(_contour(path)).buffer(exported.deviation("dxf") + 2 * FLATTENED)
+    for path, panel in zip(exported.files("dxf"), exported.panels, strict=True):
+        outline = Polygon(_contour(path)).buffer(2.0 * _distance(exported, panel))
         for entity in ezdxf.readfile(path).modelspace().query("LINE"):
             line = LineString([tuple(entity.dxf.start)[:2], tuple(entity.dxf.end)[:2]])
-            assert panel.covers(line)
+            assert outline.covers(line)
 
 
 def test_quoting_tools_see_a_closed_polyline(exported: Exported, in_node: Look) -> None:
@@ -99,7 +99,20 @@ def test_freecad_imports_the_contour_at_true_length(exported: Exported, in_freec
         assert length == pytest.approx(panel["cut_length"], rel=1e-5)  # arcs against the true edge
 
 
-FLATTENED = 1e-4  # mm, the sagitta to which arcs are flattened here
+def test_freecad_imports_the_svg_at_true_size(exported: Exported, in_freecad: Look) -> None:
+    for path, panel in zip(exported.files("svg"), exported.panels, strict=True):
+        outline = in_freecad(path)["outline"]
+        assert outline["length"] == pytest.approx(panel["cut_length"], rel=1e-5)
+
+
+PER_ARC = 1024  # points on an arc
+SAGITTA = 6e-7  # between them, over the diameter of a half circle: (pi / 2 / PER_ARC)^2 / 4
+
+
+def _distance(exported: Exported, panel: dict[str, Any]) -> float:
+    """How far the contour's points may lie from the true outline, mm."""
+    x0, y0, x1, y1 = panel["flat_bbox"]
+    return exported.deviation("dxf") + SAGITTA * max(x1 - x0, y1 - y0)
 
 
 def _outer(path: Path) -> Any:
@@ -107,8 +120,22 @@ def _outer(path: Path) -> Any:
 
 
 def _contour(path: Path) -> NDArray[np.float64]:
-    flat = ezdxf.path.make_path(_outer(path)).flattening(FLATTENED)
-    return np.array([(point.x, point.y) for point in flat])
+    """Points on the closed contour (n, 2), lines by their ends and arcs densely.
+
+    A vertex's bulge is the tangent of a quarter of the arc's angle, positive
+    counterclockwise: p(s) on the arc from a chord d = b - a is a + (sin(s w) / sin w) R(s w - w) d
+    with the half angle w = 2 atan(bulge) and R a rotation, 0 <= s <= 1.
+    """
+    vertices = np.array(_outer(path).get_points("xyb"), dtype=float)
+    pieces = []
+    for (x, y, bulge), (x1, y1, _) in zip(vertices, np.roll(vertices, -1, axis=0), strict=True):
+        start, chord = complex(x, y), complex(x1 - x, y1 - y)
+        half = 2.0 * np.arctan(bulge)
+        s = np.arange(PER_ARC) / PER_ARC if bulge else np.zeros(1)
+        ratio = np.sin(s * half) / np.sin(half) if bulge else s
+        points = start + ratio * np.exp(1j * (s - 1.0) * half) * chord
+        pieces.append(np.stack([points.real, points.imag], axis=1))
+    return np.concatenate(pieces)
 
 
 def _key(entity: Any) -> tuple[object, ...]:

@@ -1,0 +1,1 @@
+"""Fabrication: what the workshop's sheets can bear."""
