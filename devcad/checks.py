@@ -48,13 +48,14 @@ class Check:
 
 
 def require(checks: Iterable[Check], allow: frozenset[str]) -> None:
-    """Raise the first check that failed and is not in ``allow``.
+    """Raise the first check that failed and is not in ``allow``, nor follows from one that is.
 
     Raises:
         CheckFailed: with the check's panel, value, limit and remedy.
     """
+    allowed = allow.union(*(FOLLOWS.get(name, ()) for name in allow))
     for check in checks:
-        if not check.passed and check.name not in allow:
+        if not check.passed and check.name not in allowed:
             raise check.failure()
 
 
@@ -74,6 +75,9 @@ def at_most(
         name, panel, value, limit, unit, bool(value <= limit), where or Where(), says, remedy
     )
 
+
+FOLLOWS = {"twist": ("isometry", "fold-back", "step-twist", "volume")}
+"""A surface that twists is not isometric to any pattern: who allows that allows what follows."""
 
 NAMES = (
     "twist",

@@ -15,12 +15,15 @@ from devcad.export.folder import published
 from devcad.job.load import Job, JobPanel, load
 from devcad.job.recipe import Recipe, known_checks, known_formats, resolve
 from devcad.part import Panel, Part
+from devcad.proofs import mesh_volume
 from devcad.report import SvgOrigin, make_report, to_bytes
 from devcad.shop.materials import Material, material
 
 Progress = Callable[[str], None]
 """Told what begins now."""
 
+MESHES = {"stl", "glb"}
+"""The formats that carry a panel's triangles."""
 DEFAULT_FORMATS = ("step", "stl", "glb", "dxf", "svg")
 
 
@@ -115,6 +118,9 @@ def export(
             progress(f"{part.name}: {name}")
             written += writer(name)(part, folder, options or Options())
         checks = [*part.checks, *(check for file in written for check in file.checks)]
+        if MESHES.intersection(chosen):
+            solids = (panel for panel in part.panels if panel.mesh.watertight)
+            checks += [mesh_volume(panel, part.tolerance) for panel in solids]
         require(checks, allowed)
         origin = _svg_origin(part) if "svg" in chosen else None
         report = make_report(part, checks=checks, files=written, svg_origin=origin)

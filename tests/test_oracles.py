@@ -41,10 +41,11 @@ def test_worked_case(oracle, tmp_path):
         t = panel.chain.patches[0].domain
         f = panel.chain.patches[0].frame(t)
         (top,) = [e for e in panel.pattern.outline if e.name == "top"]
-        (tip,) = [e for e in panel.pattern.outline if e.name == "end"]
+        (last,) = [e for e in panel.pattern.outline if e.name == "end"]
         outer = top.curve(np.array(t[1:]))[0][0]
-        direction = tip.curve(tip.u[:1])[1][0]
-        np.testing.assert_allclose(outer - f.v_to[1] * direction, oracle.end, rtol=oracle.rel, atol=1e-12)
+        direction = last.curve(last.u[:1])[1][0]
+        tip = outer - f.v_to[1] * direction
+        np.testing.assert_allclose(tip, oracle.end, rtol=oracle.rel, atol=1e-12)
 
 
 @pytest.mark.parametrize("name", oracles.REFUSED)
@@ -73,8 +74,9 @@ def test_the_type_and_the_pattern_do_not_depend_on_units(tmp_path):
     for units, k in (("mm", 25.4), ("in", 1.0), ("m", 0.0254), ("cm", 2.54)):
         job = tmp_path / f"{units}.toml"
         job.write_text(
-            f'name = "f"\nunits = "{units}"\ntolerance = {0.05 * k / 25.4}\nthickness = {0.04 * k}\n'
-            f'[surface]\nkind = "frustum"\nradius = {4 * k}\ntop_radius = {2 * k}\nheight = {5 * k}\n'
+            f'name = "f"\nunits = "{units}"\ntolerance = {0.05 * k / 25.4}\n'
+            f'thickness = {0.04 * k}\n[surface]\nkind = "frustum"\n'
+            f"radius = {4 * k}\ntop_radius = {2 * k}\nheight = {5 * k}\n"
         )
         facts.append(devcad.build(job).panels[0].facts)
     for other in facts[1:]:

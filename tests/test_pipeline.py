@@ -408,3 +408,16 @@ def test_the_public_names_are_all_there() -> None:
     assert all(getattr(devcad, name) is not None for name in devcad.__all__)
     with pytest.raises(AttributeError):
         _ = devcad.nonsense  # type: ignore[attr-defined]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("recipe", ["cad", "sheet-metal", "paper"])
+@pytest.mark.parametrize(
+    "sample", sorted((REPOSITORY / "samples").glob("*.toml")), ids=lambda p: p.stem
+)
+def test_every_sample_builds_with_every_recipe(sample: Path, recipe: str, tmp_path: Path) -> None:
+    wanted = pipeline.plan(devcad.load(sample), pipeline=recipe)
+    part = devcad.build(sample, pipeline=recipe)
+    report = devcad.export(part, tmp_path, formats=wanted.formats, options=wanted.options)
+    assert {entry["format"] for entry in report["files"]} == set(wanted.formats)
+    assert all(check["passed"] for check in report["checks"])

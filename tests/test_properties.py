@@ -1,4 +1,4 @@
-"""What must not change the answer: motion, scale, mirror, reversal, reparametrisation, splitting."""
+"""What must not change the answer: motion, scale, mirror, reversal, parameter, splitting."""
 
 import numpy as np
 import pytest

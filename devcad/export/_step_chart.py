@@ -59,7 +59,7 @@ def chart(strip: Strip) -> Chart:
     shape = strip.shape
     assert shape.axis is not None and shape.point is not None
     axis = shape.axis / np.linalg.norm(shape.axis)
-    t = np.linspace(*strip.ends, 257)
+    t = np.linspace(strip.ends[0], strip.ends[1], 257)
     rails = strip.rails(t[128:129])[0].mean(axis=1)
     arm = rails.mean(axis=0) - shape.point
     normal = strip.patch.frame(t[128:129]).n[0]

@@ -33,8 +33,17 @@ from devcad.errors import CheckFailed, FileError, JobError
 
 SCHEMAS = {"AP214": "AP214IS", "AP242": "AP242DIS"}
 _LONG_REAL = re.compile(rb"-?\d\.\d{16}E[+-]\d+")
+_LINK = re.compile(rb"NEXT_ASSEMBLY_USAGE_OCCURRENCE\('\d+'")
+_PAINT = re.compile(
+    rb"MECHANICAL_DESIGN_GEOMETRIC_PRESENTATION_REPRESENTATION\(\s*'',\s*\(\s*#(\d+)\s*\),\s*#(\d+)"
+    rb"\s*\);\s*#\d+ = STYLED_ITEM\(\s*'color',\s*\(\s*#(\d+)\s*\),\s*#(\d+)\s*\);"
+)
 EPOCH = "1970-01-01T00:00:00"
-_SETTINGS = {"write.step.unit": "MM", "write.surfacecurve.mode": 1, "write.precision.mode": 0}
+_SETTINGS: dict[str, str | int] = {
+    "write.step.unit": "MM",
+    "write.surfacecurve.mode": 1,
+    "write.precision.mode": 0,
+}
 
 
 def write_step(
@@ -63,7 +72,7 @@ def write_step(
         _header(APIHeaderSection_MakeHeader(session.Model()), name)
         text = _printed(StepData_StepWriter(session.Model()), session.WS().Protocol())
     try:
-        path.write_bytes(_renumbered(text))
+        path.write_bytes(_settled(text))
     except OSError as error:
         raise FileError(
             f"cannot write {path.name}: {error.strerror}",
@@ -159,14 +168,26 @@ def _real(value: float) -> bytes:
     return f"{mantissa}{point}{'E' if exponent else ''}{exponent}".encode()
 
 
-def _renumbered(text: bytes) -> bytes:
-    """Assembly links numbered from 1: the kernel counts them over the whole process."""
+def _settled(text: bytes) -> bytes:
+    """What the kernel leaves to chance, put in order.
+
+    It counts assembly links over the whole process, so they are numbered from 1; and it lists the
+    coloured bodies by their addresses. All bodies have one colour, so that their blocks differ
+    only in context and body: those pairs are dealt out again in the order of the bodies.
+    """
     count = itertools.count(1)
-    return re.sub(
-        rb"NEXT_ASSEMBLY_USAGE_OCCURRENCE\('\d+'",
-        lambda _: b"NEXT_ASSEMBLY_USAGE_OCCURRENCE('%d'" % next(count),
-        text,
-    )
+    text = _LINK.sub(lambda _: b"NEXT_ASSEMBLY_USAGE_OCCURRENCE('%d'" % next(count), text)
+    pairs = iter(sorted((int(m[4]), int(m[2])) for m in _PAINT.finditer(text)))
+
+    def dealt(m: re.Match[bytes]) -> bytes:
+        body, context = next(pairs)
+        return (
+            b"MECHANICAL_DESIGN_GEOMETRIC_PRESENTATION_REPRESENTATION('',(\n"
+            b"    #%s),#%d);\n#%s = STYLED_ITEM('color',(#%s),#%d);"
+            % (m[1], context, m[1], m[3], body)
+        )
+
+    return _PAINT.sub(dealt, text)
 
 
 @contextmanager

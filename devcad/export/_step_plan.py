@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import pairwise
 
 import numpy as np
 
@@ -14,9 +13,9 @@ from devcad.export._step_draft import Draft, Skin
 from devcad.export._step_rails import EDGE_TOLERANCE, LongEdge, Piece, fitted_rails
 from devcad.export._step_strips import Strip, panel_size, strips
 from devcad.geometry.fit import FLOOR, Spline
-from devcad.geometry.patch import Patch
 from devcad.geometry.taylor import Array
 from devcad.part import Panel
+from devcad.proofs import sheet_volume
 
 AREA_SIZE = 250.0  # mm: below it the tolerance shrinks with the part, for areas are relative
 
@@ -45,7 +44,7 @@ def body(panel: Panel, tolerance: float, degree: int) -> Body:
         tuple(draft.edges),
         tuple(draft.faces),
         panel.thickness > 0.0,
-        _volume(panel, parts),
+        sheet_volume(panel),
     )
 
 
@@ -82,7 +81,7 @@ def _fitted_skin(strip: Strip, corners: Array, tolerance: float, degree: int) ->
 def _exact_skin(strip: Strip, draft: Draft, lifts: Array, tolerance: float, degree: int) -> Skin:
     """A strip on a plane, a circular cylinder or a right circular cone."""
     corners = draft.corner_points(strip)
-    reach = strip.rails(np.linspace(*strip.ends, 33))
+    reach = strip.rails(np.linspace(strip.ends[0], strip.ends[1], 33))
     frame, round_ = None, None
     surfaces: Sequence[Surface] = [
         Plane(corners[0, 0, k], n) for k, n in enumerate(_outward(strip))
@@ -162,23 +161,3 @@ def _corners(parts: list[Strip], count: int, size: float) -> tuple[Array, Array]
                     remedy="with thickness, end the extent before the apex",
                 )
     return corners, lifts
-
-
-def _volume(panel: Panel, parts: list[Strip]) -> float:
-    """The exact volume of a solid, 0 of a sheet: area x thickness, and at an apex what the layers'
-    own ends add, (T^3 / 24) integral of c^2 / |a| (design.md, section 7)."""
-    if not panel.thickness:
-        return 0.0
-    extra = sum(_apex_integral(s.patch, s.course.t) for s in parts if any(s.tips))
-    thickness = panel.thickness
-    return panel.pattern.area * thickness + thickness**3 / 24.0 * extra
-
-
-def _apex_integral(patch: Patch, borders: Array) -> float:
-    """The integral of c^2 / |a| between the borders, Gauss with 32 nodes in each stretch."""
-    nodes, weights = np.polynomial.legendre.leggauss(32)
-    total = 0.0
-    for a, b in pairwise(borders):
-        f = patch.frame(0.5 * (a + b) + 0.5 * (b - a) * nodes)
-        total += 0.5 * (b - a) * float(weights @ (f.c**2 / np.abs(f.a)))
-    return total

@@ -128,16 +128,16 @@ def _distances(surface: BRepAdaptor_Surface, points: Array) -> Array:
     """The distances of points (n, 3) from an unbounded plane, cylinder or cone, (n,)."""
     if surface.GetType() == GeomAbs_Plane:
         origin, normal = _axis(surface.Plane().Axis())
-        return np.abs((points - origin) @ normal)
+        return np.asarray(np.abs((points - origin) @ normal))
     cone = surface.GetType() == GeomAbs_Cone
     form = surface.Cone() if cone else surface.Cylinder()
     origin, axis = _axis(form.Axis())
     height = (points - origin) @ axis
     reach = np.linalg.norm(points - origin - height[:, None] * axis, axis=1)
     if not cone:
-        return np.abs(reach - form.Radius())
+        return np.asarray(np.abs(reach - form.Radius()))
     angle = form.SemiAngle()
-    return np.abs((reach - form.RefRadius()) * np.cos(angle) - height * np.sin(angle))
+    return np.asarray(np.abs((reach - form.RefRadius()) * np.cos(angle) - height * np.sin(angle)))
 
 
 def _axis(axis: gp_Ax1) -> tuple[Array, Array]:

@@ -57,7 +57,7 @@ def fitted_rails(
     t, s = strip.course.t, strip.course.s
     speeds = np.diff(t)[[0, -1]] / np.diff(s)[[0, -1]]
     slopes = strip.end_slopes().reshape(2, -1) * speeds[:, None]
-    for side in np.nonzero(strip.tips)[0]:
+    for side in np.flatnonzero(np.array(strip.tips)):
         if layers == 1:
             slopes[:, blocks[side]] = 0.0
     held = (slopes[0], slopes[1]) if np.isfinite(slopes).all() else None

@@ -11,7 +11,7 @@ from devcad.flatten.development import Development
 from devcad.flatten.pattern import Edge, Line, Pattern
 from devcad.geometry import chebyshev
 from devcad.geometry.chain import Chain
-from devcad.geometry.patch import Patch
+from devcad.geometry.patch import Frame, Patch
 from devcad.geometry.taylor import Array
 
 PlaneDensity = Callable[[Array, Array], Array]
@@ -52,14 +52,17 @@ def lay_out(
 
 def surface_area(patch: Patch) -> float:
     """The area of a patch in mm2: the integral of q (v1 - v0) + a (v1^2 - v0^2) / 2."""
+    return integral(patch, _area_density)
 
-    def density(t: Array) -> Array:
-        f = patch.frame(t)
-        value = f.q * (f.v_to - f.v_from) + 0.5 * f.a * (f.v_to**2 - f.v_from**2)
-        return value[:, None]
 
-    integral = chebyshev.resolve(density, patch.segments).antiderivative()
-    return float(integral(np.array(patch.domain))[1, 0])
+def integral(patch: Patch, density: Callable[[Frame], Array]) -> float:
+    """The integral over t of a density (n,) made from the frame, to rounding."""
+    series = chebyshev.resolve(lambda t: density(patch.frame(t))[:, None], patch.segments)
+    return float(series.antiderivative()(np.array(patch.domain))[1, 0])
+
+
+def _area_density(f: Frame) -> Array:
+    return np.asarray(f.q * (f.v_to - f.v_from) + 0.5 * f.a * (f.v_to**2 - f.v_from**2))
 
 
 def perimeter(outline: tuple[Edge, ...]) -> float:

@@ -113,6 +113,7 @@ def cut_at(chain: Chain, t: float) -> Chain:
             f"cut: no ruling at t = {t:.6g}, the parameter runs from {low:.6g} to {high:.6g}",
             value=t,
             limit=high,
+            remedy="choose t between the two",
         )
     if t in (low, high):
         return chain
@@ -154,6 +155,7 @@ def with_gap(chain: Chain, gap: float) -> Chain:
             f"gap: {gap:.6g} mm is wider than the last patch, {width(low):.6g} mm",
             value=gap,
             limit=width(low),
+            remedy="choose a narrower gap, or begin the curve elsewhere",
         )
     low = float(wide[0])
     for _ in range(60):

@@ -203,4 +203,4 @@ def _inner_height(jet: RulingJet) -> Array:
     still, moving = rows_cross(jet.e[0], jet.c0[1]), rows_cross(jet.e[0], jet.e[1])
     at_half, at_other = still + half[:, None] * moving, still + other[:, None] * moving
     wide = rows_dot(at_half, at_half) >= 0.25 * rows_dot(at_other, at_other)
-    return np.where(wide, half, other)
+    return np.asarray(np.where(wide, half, other))

@@ -17,12 +17,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from devcad.errors import LimitError
 from devcad.geometry import taylor
 from devcad.geometry.patch import Patch
 from devcad.geometry.taylor import Array
 
 TURN = np.radians(30.0)
 """Largest turning of the normal, or of the ruling in the sheet, across one strip."""
+MOST = 200_000
+"""Rulings of one segment that nobody can mean."""
 USED = 0.998
 """Share of the tolerance that placement aims at; the rest covers sampling between points."""
 INNER = np.arange(1, 12) / 12
@@ -45,6 +48,9 @@ def place(patch: Patch, layers: tuple[float, ...], tolerance: float) -> Placemen
     ``layers`` are the distances along n of the surfaces to be meshed. Rulings break where the
     surface's curvature jumps; at smoother breaks they need not. At most 30 degrees of turning
     lie in one strip. Source: algorithms.md, 3.
+
+    Raises:
+        LimitError: more rulings than a part can have.
     """
     ends = _segments(patch, layers)
     pieces = [
@@ -108,7 +114,7 @@ def _density(patch: Patch, layers: tuple[float, ...], t: Array, tolerance: float
             across = second - np.where(length > 0.0, along, 0.0)[:, None] * first
             sagitta = np.maximum(sagitta, np.linalg.norm(across, axis=1))
     density = np.sqrt(sagitta / (8.0 * USED * tolerance))
-    return np.maximum(density, np.hypot(jet.a[0], jet.c[0]) / TURN)
+    return np.asarray(np.maximum(density, np.hypot(jet.a[0], jet.c[0]) / TURN))
 
 
 def _place_segment(
@@ -129,6 +135,14 @@ def _place_segment(
         t[0], t[-1] = low, high
         return Placement(t, float(strip_deviation(patch, layers, t).max()))
 
+    if max(fewest, total) > MOST:
+        raise LimitError(
+            f"the tolerance of {tolerance:.6g} mm asks for {max(fewest, total):.6g} rulings, "
+            f"limit {MOST}",
+            value=float(max(fewest, total)),
+            limit=float(MOST),
+            remedy="raise the tolerance; is the part in the right units?",
+        )
     number = max(fewest, int(np.ceil(total - 1e-9)))
     best: Placement | None = None
     floor = fewest

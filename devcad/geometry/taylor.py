@@ -122,7 +122,7 @@ def norm(x: Array) -> Array:
 
 
 def unit(x: Array) -> Array:
-    """x / |x|; x[0] must not vanish. Scaled first, so that tiny and huge vectors do not underflow."""
+    """x / |x|; x[0] must not vanish. Scaled first: tiny and huge vectors have a length too."""
     scale = np.abs(x[0]).max(axis=-1)
     x = x / np.where(scale > 0.0, scale, 1.0)[None, :, None]
     return mul(power(dot(x, x), -0.5), x)

@@ -27,6 +27,7 @@ from devcad.units import MM_PER_UNIT
 MAX_JOB_BYTES = 256_000
 MAX_POINTS_BYTES = 4_000_000  # 100 000 points with 12 digits each
 DEFAULT_TOLERANCE = 0.05  # mm
+SMALLEST_TOLERANCE = 1e-6  # mm; finer than any workshop or CAD system
 PARALLEL = 1e-9  # sine of the angle below which two directions are one
 LARGEST = 1e12  # in any unit; cubes of it times 1e9 still are finite and exact enough
 
@@ -148,7 +149,7 @@ def _job(tree: dict[str, Any], place: str, sha256: str) -> Job:
         path=place,
         sha256=sha256,
         mm_per_unit=scale,
-        tolerance=DEFAULT_TOLERANCE if table.tolerance is None else table.tolerance * scale,
+        tolerance=_tolerance(table.tolerance, scale, place),
         thickness=table.thickness * scale,
         reference=table.reference,
         material=table.material,
@@ -162,6 +163,21 @@ def _job(tree: dict[str, Any], place: str, sha256: str) -> Job:
             for name, (kind, surface), where in zip(names, surfaces, places, strict=True)
         ),
     )
+
+
+def _tolerance(value: float | None, scale: float, place: str) -> float:
+    """The tolerance in mm."""
+    if value is None:
+        return DEFAULT_TOLERANCE
+    if value * scale < SMALLEST_TOLERANCE:
+        raise JobError(
+            f"must be at least {SMALLEST_TOLERANCE:g} mm, is {value * scale:g} mm",
+            place=f"{place} > tolerance",
+            value=value * scale,
+            limit=SMALLEST_TOLERANCE,
+            remedy="no workshop and no CAD system is finer",
+        )
+    return value * scale
 
 
 def _meta(table: MetaTable) -> Meta:

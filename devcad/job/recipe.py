@@ -154,10 +154,10 @@ def _flat(table: RecipeTable) -> dict[str, Any]:
 
 
 def _first_sentence(path: Path) -> str:
-    """The comment that opens a recipe file, to its first full stop or colon."""
+    """The comment that opens a recipe file, to its first full stop."""
     lines = path.read_text(encoding="utf-8").splitlines()
     comment = " ".join(line.lstrip("# ") for line in lines[: _first_key(lines)])
-    return comment.split(". ")[0].split(": ")[0].strip()
+    return comment.split(". ")[0].strip(" .")
 
 
 def _first_key(lines: list[str]) -> int:
