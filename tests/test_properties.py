@@ -5,12 +5,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from patches import ellipse_cylinder, frustum, helix_tangent, slanted_pipe
+from strategies import natural_equations, rigid_motions, scales
 
 from devcad.assemble import PanelSpec, assemble
 from devcad.flatten.development import develop, develop_chain
 from devcad.flatten.outline import lay_out, surface_area
 from devcad.geometry import taylor
 from devcad.geometry.chain import Chain, link
+from devcad.geometry.constructions.tangent import Tangent
+from devcad.geometry.curves import NaturalCurve
 from devcad.geometry.patch import Patch, RulingJet
 from devcad.geometry.rulings import place
 
@@ -20,23 +23,7 @@ PARTS = {
     "ellipse": ellipse_cylinder(90.0, 60.0, 30.0),
     "pipe": slanted_pipe(40.0),
 }
-numbers = st.floats(-1.0, 1.0)
 parts = st.sampled_from(sorted(PARTS))
-
-
-@st.composite
-def rotations(draw):
-    """A rotation matrix from a unit quaternion."""
-    q = np.array([draw(numbers) for _ in range(4)])
-    norm = np.linalg.norm(q)
-    w, x, y, z = q / norm if norm > 0.1 else np.array([1.0, 0.0, 0.0, 0.0])
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
-    )
 
 
 def outline_points(patch: Patch) -> np.ndarray:
@@ -77,11 +64,9 @@ def backwards(patch: Patch) -> Patch:
     return Patch(field, patch.domain)
 
 
-@given(name=parts, turn=rotations(), shift=st.tuples(numbers, numbers, numbers))
-def test_moving_the_part_leaves_its_pattern_where_it_is(name, turn, shift):
-    matrix = np.eye(4)
-    matrix[:3, :3], matrix[:3, 3] = turn, 1000.0 * np.array(shift)
-    moved = PARTS[name].transformed(matrix)
+@given(name=parts, motion=rigid_motions())
+def test_moving_the_part_leaves_its_pattern_where_it_is(name, motion):
+    moved = PARTS[name].transformed(motion)
     np.testing.assert_allclose(
         outline_points(moved),
         outline_points(PARTS[name]),
@@ -89,12 +74,24 @@ def test_moving_the_part_leaves_its_pattern_where_it_is(name, turn, shift):
     )
 
 
-@given(name=parts, exponent=st.floats(-3.0, 3.0))
-def test_scaling_the_part_scales_its_pattern(name, exponent):
-    k = 10.0**exponent
+@given(name=parts, scale=scales(1e-3, 1e3))
+def test_scaling_the_part_scales_its_pattern(name, scale):
     np.testing.assert_allclose(
-        outline_points(PARTS[name].scaled(k)) / k, outline_points(PARTS[name]), atol=1e-10
+        outline_points(PARTS[name].scaled(scale)) / scale, outline_points(PARTS[name]), atol=1e-10
     )
+
+
+@given(equations=natural_equations())
+def test_a_tangent_surface_unrolls_to_the_turning_of_its_curve(equations):
+    # the flat edge has the same curvature, so its turning is the integral of the curvature
+    curvature, torsion, mean = equations
+    curve = NaturalCurve(kind="natural", curvature=curvature, torsion=torsion, t=(0, 1))
+    surface = Tangent(kind="tangent", curve=curve, extent=(0.1 / mean, 0.3 / mean))
+    (patch,) = surface.build().panels[0]
+    nodes, weights = np.polynomial.legendre.leggauss(60)
+    k = eval(curvature, {"sin": np.sin, "t": 0.5 * (nodes + 1)})  # our own text
+    turning = develop(patch).series(np.array([1.0]))[0, 0]
+    assert turning == pytest.approx(0.5 * weights @ k, rel=1e-11)
 
 
 @pytest.mark.parametrize("name", PARTS)

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from devcad.checks import Check
+from devcad.errors import FileError
 
 if TYPE_CHECKING:  # the table of formats must not cost the import of numpy
     from devcad.part import Part
@@ -53,8 +54,20 @@ FORMATS: dict[str, tuple[str, str]] = {
 
 
 def writer(name: str) -> Writer:
-    """The ``write`` function of a format; its libraries load now and not before."""
-    write: Writer = import_module(FORMATS[name][0]).write
+    """The ``write`` function of a format; its libraries load now and not before.
+
+    Raises:
+        FileError: a library of that format cannot be loaded on this machine.
+    """
+    try:
+        write: Writer = import_module(FORMATS[name][0]).write
+    except ImportError as error:
+        raise FileError(
+            f"the format {name} cannot be written here: {error}",
+            value=name,
+            remedy="install the missing library (on Debian: libgl1 libx11-6), or leave the format "
+            "out with --to",
+        ) from None
     return write
 
 

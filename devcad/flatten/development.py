@@ -90,12 +90,14 @@ def develop(patch: Patch) -> Development:
         cos, sin = np.cos(omega), np.sin(omega)
         return np.column_stack([a, p * cos - q * sin, p * sin + q * cos, c])
 
-    # an angle is zero below rounding of a radian, a length below rounding of the base curve; the
-    # bending is not part of the shape and folds back within 1e-8: 1e-12 is enough for it
-    seen = np.abs(sample(np.linspace(*patch.domain, 19)[1:-1], 0.0, 0.0)).max(axis=0)
-    length = max(seen[1], seen[2])
-    floor = np.array([1.0 / span, length, length, 100.0 * max(seen[3], 1.0 / span)])
-    rates = chebyshev.resolve_by(sample, lift, knots, scale=floor)
+    def scale(raw: Array) -> Array:
+        # an angle is zero below rounding of a radian, a length below rounding of the base curve;
+        # the bending is no part of the shape and folds back within 1e-8: 1e-12 is enough for it
+        seen = np.abs(raw).max(axis=0)
+        length = max(seen[1], seen[2])
+        return np.array([1.0 / span, length, length, 100.0 * max(seen[3], 1.0 / span)])
+
+    rates = chebyshev.resolve_by(sample, lift, knots, scale=scale)
     return Development(_assemble(rates))
 
 

@@ -82,7 +82,13 @@ def resolve(function: Function, knots: Array, *, scale: Array | float | None = N
         scale: the size below which a component counts as zero, (d,) or one number for all;
             default: the largest value of the component that was seen.
     """
-    return resolve_by(lambda t, _low, _high: function(t), lambda v, _h: v, knots, scale=scale)
+    floor = 0.0 if scale is None else scale
+    return resolve_by(
+        lambda t, _low, _high: function(t),
+        lambda v, _half: v,
+        knots,
+        scale=lambda raw: np.broadcast_to(np.asarray(floor, dtype=float), raw.shape[1:]),
+    )
 
 
 def resolve_by(
@@ -90,7 +96,7 @@ def resolve_by(
     lift: Callable[[Array, float], Array],
     knots: Array,
     *,
-    scale: Array | float | None = None,
+    scale: Callable[[Array], Array],
 ) -> Piecewise:
     """As ``resolve``, for a function that is made on each panel from the samples on it.
 
@@ -98,9 +104,11 @@ def resolve_by(
         sample: (t, low, high) -> (n, d0) the samples taken.
         lift: (samples (n, d0), half width) -> (n, d) the values to be represented, which must
             be resolved; integrals over the panel may enter.
+        scale: the first panel's first samples -> the size below which a component counts as
+            zero, (d,).
     """
     done: list[tuple[float, float, Array]] = []
-    size = np.zeros(1)
+    size = np.zeros(0)
     count = 0
     stack = [(a, b, 0) for a, b in zip(knots[:-1].tolist(), knots[1:].tolist(), strict=True)][::-1]
     while stack:
@@ -108,12 +116,12 @@ def resolve_by(
         raw = np.zeros((0, 0))
         for nodes in SIZES:
             raw, fresh = _grow(sample, low, high, nodes, raw)
+            size = size if count else scale(raw)
             count += fresh
             values = lift(raw, 0.5 * (high - low))
             coefficients = transform(nodes) @ values
             size = np.maximum(size, np.abs(values).max(axis=0, initial=0.0))
-            floor = size if scale is None else np.maximum(size, scale)
-            verdict = _verdict(coefficients, floor)
+            verdict = _verdict(coefficients, size)
             if verdict != "double":
                 break
         if verdict == "done" or depth >= DEPTH:

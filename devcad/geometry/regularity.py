@@ -170,6 +170,7 @@ def regression_curve(patch: Patch, number: int = 65) -> tuple[Array, Array] | No
     if not there.any():
         return None
     v = -frame.q[there] / frame.a[there]
+    t[0], t[-1] = patch.domain
     return t[there], frame.c0[there] + v[:, None] * frame.e[there]
 
 
@@ -210,9 +211,14 @@ def largest(patch: Patch, function: Callable[[Array], Array]) -> tuple[float, fl
         low, high = t[max(best - 1, 0)], t[min(best + 1, len(t) - 1)]
         t = np.linspace(low, high, 17)
         values = function(t)
+    return value, _snapped(patch, place)
+
+
+def _snapped(patch: Patch, t: float) -> float:
+    """The domain's end where t is within rounding of it: samples keep just inside."""
     low, high = patch.domain
-    width = 1e-12 * (high - low)  # samples keep a rounding away from the ends
-    return value, low if place - low < width else high if high - place < width else place
+    width = 1e-12 * (high - low)
+    return low if t - low < width else high if high - t < width else t
 
 
 def _swallow(patch: Patch, t: Array) -> Array:
@@ -262,5 +268,6 @@ def _nearest_edge_point(patch: Patch, t: Array) -> Singularity | None:
         v = -frame.q / frame.a
         gap = np.maximum(np.maximum(frame.v_from - v, v - frame.v_to), 0.0)
     best = int(np.nanargmin(np.where(np.isfinite(gap), gap, np.inf)))
-    point = _edge_point(patch, float(t[best]))
-    return None if point is None else Singularity(float(t[best]), point, "cuspidal-edge")
+    place = _snapped(patch, float(t[best]))
+    point = _edge_point(patch, place)
+    return None if point is None else Singularity(place, point, "cuspidal-edge")

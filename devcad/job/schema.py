@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 from pydantic import Field, create_model
 
-from devcad.geometry.constructions import SurfaceSpec
+from devcad.geometry.constructions import surface_spec
 from devcad.job.tables import JobTable, PanelTable
 
 
@@ -15,10 +15,11 @@ def job_schema() -> dict[str, Any]:
 
     Conditions between keys (either [surface] or [[panel]], names that differ) are not in it.
     """
-    panel = create_model("PanelTable", __base__=PanelTable, surface=(SurfaceSpec, ...))
+    surface = surface_spec()
+    panel = create_model("PanelTable", __base__=PanelTable, surface=(surface, ...))
     panels = Annotated[list[panel], Field(min_length=1)] | None
     job = create_model(
-        "JobTable", __base__=JobTable, surface=(SurfaceSpec | None, None), panel=(panels, None)
+        "JobTable", __base__=JobTable, surface=(surface | None, None), panel=(panels, None)
     )
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",

@@ -8,10 +8,10 @@ import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
 from devcad.errors import DevcadError
-from devcad.geometry.constructions import Built, SurfaceSpec
+from devcad.geometry.constructions import Built, surface_spec
 from devcad.geometry.patch import Frame, Patch
 
-ADAPTER = TypeAdapter(SurfaceSpec)
+ADAPTER = TypeAdapter(surface_spec())
 
 
 def build(**table: Any) -> Built:

@@ -11,7 +11,7 @@ import pytest
 from constructing import inside, patches
 from pydantic import TypeAdapter
 
-from devcad.geometry.constructions import SURFACES, Closable, SurfaceSpec
+from devcad.geometry.constructions import SURFACES, Closable, surface_spec
 
 SAMPLES = Path(__file__).parents[2] / "samples"
 JOBS = {path.stem: tomllib.loads(path.read_text()) for path in sorted(SAMPLES.glob("*.toml"))}
@@ -50,7 +50,7 @@ def test_every_kind_has_a_sample(kind):
 
 
 def test_the_kind_tells_the_model():
-    adapter = TypeAdapter(SurfaceSpec)
+    adapter = TypeAdapter(surface_spec())
     for name in NAMES:
         table = surface(name)
         assert type(adapter.validate_python(table)) is SURFACES[table["kind"]]
@@ -59,10 +59,10 @@ def test_the_kind_tells_the_model():
 
 def test_what_may_close_takes_the_keys_of_the_seam():
     tube = {"kind": "cylinder", "radius": 1, "length": 1, "cut": "pi/2", "gap": 0.5}
-    model = TypeAdapter(SurfaceSpec).validate_python(tube)
+    model = TypeAdapter(surface_spec()).validate_python(tube)
     assert isinstance(model, Closable)
     assert (model.cut, model.gap) == (np.pi / 2, 0.5)
     with pytest.raises(ValueError, match="cut"):
-        TypeAdapter(SurfaceSpec).validate_python(
+        TypeAdapter(surface_spec()).validate_python(
             {"kind": "plane", "width": 1, "height": 1, "cut": 0}
         )

@@ -2,38 +2,54 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from functools import reduce
+from importlib import import_module
 from operator import or_
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated, Any
 
 from pydantic import Field
 
 from devcad.geometry.constructions.base import Built, Closable, Surface
-from devcad.geometry.constructions.cone import Cone
-from devcad.geometry.constructions.cylinder import Cylinder
-from devcad.geometry.constructions.frustum import Frustum
-from devcad.geometry.constructions.line_of_curvature import LineOfCurvature
-from devcad.geometry.constructions.plane import Plane
-from devcad.geometry.constructions.rectifying import Rectifying
-from devcad.geometry.constructions.ruled import Ruled
-from devcad.geometry.constructions.tangent import Tangent
 
-SURFACES: dict[str, type[Surface]] = {
-    "plane": Plane,
-    "cylinder": Cylinder,
-    "cone": Cone,
-    "frustum": Frustum,
-    "ruled": Ruled,
-    "tangent": Tangent,
-    "rectifying": Rectifying,
-    "line-of-curvature": LineOfCurvature,
+ROWS = {
+    "plane": "Plane",
+    "cylinder": "Cylinder",
+    "cone": "Cone",
+    "frustum": "Frustum",
+    "ruled": "Ruled",
+    "tangent": "Tangent",
+    "rectifying": "Rectifying",
+    "line-of-curvature": "LineOfCurvature",
 }
+"""Each kind's class; it stands in the file of the kind's name."""
+
+
+class _Table(Mapping[str, type[Surface]]):
+    """Kind -> model; a kind's file is loaded when it is asked for, as a job has only a few."""
+
+    def __getitem__(self, kind: str) -> type[Surface]:
+        name = ROWS[kind]
+        model: type[Surface] = getattr(import_module(f"{__name__}.{kind.replace('-', '_')}"), name)
+        return model
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(ROWS)
+
+    def __len__(self) -> int:
+        return len(ROWS)
+
+    def __contains__(self, kind: object) -> bool:
+        return kind in ROWS
+
+
+SURFACES: Mapping[str, type[Surface]] = _Table()
 """Each kind's model."""
 
-if TYPE_CHECKING:  # a union made from a table is beyond static typing
-    SurfaceSpec = Surface
-else:
-    SurfaceSpec = Annotated[reduce(or_, SURFACES.values()), Field(discriminator="kind")]
-    """Any surface, told apart by its key ``kind``."""
 
-__all__ = ["SURFACES", "Built", "Closable", "Surface", "SurfaceSpec"]
+def surface_spec() -> Any:
+    """The type of any surface, told apart by its key ``kind``, for the JSON Schema."""
+    return Annotated[reduce(or_, SURFACES.values()), Field(discriminator="kind")]
+
+
+__all__ = ["SURFACES", "Built", "Closable", "Surface", "surface_spec"]

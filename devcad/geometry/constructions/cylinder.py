@@ -27,8 +27,10 @@ from devcad.geometry.values import unit
 
 
 class Cylinder(Closable):
-    """Parallel rulings along ``directrix``, or along a circle about z; slanted ends by extents
-    that are expressions. c0 = directrix, e = direction, v the length from the directrix.
+    """Parallel rulings along ``directrix``, or along a circle about z.
+
+    c0 = directrix, e = direction, v the length from the directrix; an extent that is an expression
+    gives slanted ends.
     """
 
     kind: Literal["cylinder"]

@@ -32,8 +32,10 @@ SAME_FRACTION = 1e-12
 
 
 class Ruled(Closable):
-    """Rulings along ``direction`` from a ``curve``, or between two ``rails`` at equal fractions
-    of their parameters. Whether they make a developable is for the checks to say.
+    """Rulings along ``direction`` from a ``curve``, or between two ``rails``.
+
+    The rails are joined at equal fractions of their parameters. Whether the rulings make a
+    developable is for the checks to say.
 
     c0 = curve or rails[0], e = the direction or towards rails[1]; the extent is a length, or
     with rails a fraction of the way (default [0, 1]); t is the parameter of c0.

@@ -11,8 +11,9 @@ from devcad.geometry.taylor import Array
 
 
 class Tangent(Closable):
-    """The tangents of ``curve``, which is the surface's regression curve: c0 = curve, e = T, v =
-    length from it.
+    """The tangents of ``curve``, which is the surface's regression curve.
+
+    c0 = curve, e = T, v = length from it.
 
     Source: geometry.md, section 2 (first row).
     """
