@@ -18,16 +18,22 @@ from devcad.facts import panel_facts
 from devcad.flatten.bend import bent
 from devcad.flatten.development import Development, develop_chain
 from devcad.flatten.outline import lay_out
-from devcad.geometry.chain import Chain, cut_at, link, parallel_chain, with_gap
-from devcad.geometry.classify import Shape, classify
-from devcad.geometry.layers import at_apex
+from devcad.geometry.chain import Chain, cut_at, link, with_gap
+from devcad.geometry.classify import Shape, classify, patch_box
+from devcad.geometry.layers import at_apex, straight_sided
+from devcad.geometry.parallel import parallel_chain
 from devcad.geometry.patch import Patch
 from devcad.geometry.rulings import place
 from devcad.geometry.taylor import Array
 from devcad.mesh.build import build_mesh
+from devcad.mesh.mesh import Mesh
 from devcad.part import Panel, Part
-from devcad.proofs import prove_pattern, prove_surface
+from devcad.proofs import prove_pattern, prove_surface, volume_error
 
+FLOAT32 = float(np.sqrt(3.0)) * 2.0**-24
+"""Largest distance that rounding to float32 moves a point, per unit of its largest coordinate."""
+ATTEMPTS = 4
+"""How often the rulings are placed anew for the sake of a thick sheet's volume."""
 STEEPEST_MITRE = np.radians(150.0)
 """A crease of a thick sheet beyond this has no sensible mitre (design.md, section 7)."""
 
@@ -126,12 +132,8 @@ def _panel(
         require(checks, allow)
     developments = develop_chain(middle)
     chain = middle if bend == 1.0 else bent(middle, developments, bend)
-    placements = [place(patch, layers, tolerance) for patch in chain.patches]
-    rulings = tuple(p.t for p in placements)
+    mesh, rulings = _meshed(chain, layers, developments, tolerance)
     pattern = lay_out(middle, developments, rulings)
-    deviation = max(p.deviation for p in placements)
-    flat = _flat(developments)
-    mesh = build_mesh(chain, rulings, layers, flat, deviation)
     shapes3d = shapes if bend == 1.0 else tuple(classify(patch) for patch in chain.patches)
     panel = Panel(spec.name, spec.kind, chain, shapes3d, thickness, rulings, mesh, pattern)
     checks += prove_pattern(
@@ -158,11 +160,31 @@ def _middle(chain: Chain, thickness: float, reference: str) -> Chain:
     return parallel_chain(chain, -0.5 * thickness if reference == "front" else 0.5 * thickness)
 
 
-def _flat(developments: tuple[Development, ...]) -> Any:
+def _meshed(
+    chain: Chain, layers: tuple[float, ...], developments: tuple[Development, ...], tolerance: float
+) -> tuple[Mesh, tuple[Array, ...]]:
+    """The mesh within the tolerance, what float32 will round off taken away, and its rulings.
+
+    A very thick sheet's volume needs more rulings than the distance does: then as many as keep
+    it within area x tolerance.
+    """
+
     def places(number: int, t: Array, v: Array) -> Array:
         return developments[number].points(t, v)
 
-    return places
+    reach = max(float(np.abs(patch_box(patch)).max()) for patch in chain.patches)
+    rounding = FLOAT32 * (reach + abs(layers[0]))
+    aim = max(tolerance - rounding, 0.5 * tolerance)
+    for _ in range(ATTEMPTS):
+        placements = [place(patch, layers, aim) for patch in chain.patches]
+        rulings = tuple(placement.t for placement in placements)
+        deviation = max(placement.deviation for placement in placements)
+        mesh = build_mesh(chain, rulings, layers, places, deviation)
+        excess = volume_error(mesh, chain, layers[-1] - layers[0]) / tolerance
+        if excess <= 1.0:
+            break
+        aim *= 0.95 / excess
+    return mesh, rulings
 
 
 def _reaches_apex(chain: Chain, shapes: tuple[Shape, ...]) -> tuple[bool, ...]:
@@ -185,7 +207,9 @@ def _refuse_creases(chain: Chain, shapes: tuple[Shape, ...]) -> None:
         t = float(chain.patches[after].domain[0])
         angle = float(np.degrees(abs(joint.angle)))
         planes = shapes[k].type == "plane" and shapes[after].type == "plane"
-        if not planes or not _straight(chain.patches[k]) or not _straight(chain.patches[after]):
+        if not planes or not (
+            straight_sided(chain.patches[k]) and straight_sided(chain.patches[after])
+        ):
             raise GeometryError(
                 f"a crease of {angle:.4g} deg at t = {t:.6g} in a sheet with thickness, between "
                 "faces that are not plane with straight edges",
@@ -210,14 +234,3 @@ def _refuse_thick_apex(shapes: tuple[Shape, ...], apex: tuple[bool, ...]) -> Non
                 "a cone that is not a right circular one",
                 remedy="begin the extent a little above the apex, or give the part no thickness",
             )
-
-
-def _straight(patch: Patch) -> bool:
-    """Whether both rails are straight lines within 1e-9 of their length."""
-    jet = patch.jet(np.linspace(*patch.domain, 9), 0)
-    for rail in (jet.rail(jet.v_from)[0], jet.rail(jet.v_to)[0]):
-        chord = rail[-1] - rail[0]
-        away = np.linalg.norm(np.cross(rail - rail[0], chord), axis=1)
-        if away.max() > 1e-9 * float(chord @ chord):
-            return False
-    return True

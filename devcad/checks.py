@@ -44,6 +44,8 @@ class Check:
             value=self.value,
             limit=self.limit,
             remedy=self.remedy,
+            check=self.name,
+            t=self.where.t,
         )
 
 
@@ -92,9 +94,6 @@ NAMES = (
     "step-valid",
     "dxf-deviation",
     "dxf-readback",
-    "svg-deviation",
-    "svg-readback",
-    "glb-readback",
     "svg-deviation",
     "svg-readback",
     "stl-readback",

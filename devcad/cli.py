@@ -7,18 +7,16 @@ and usage errors answer at once.
 from __future__ import annotations
 
 import json
-import signal
-import sys
-import threading
 import warnings
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 import typer
 
 from devcad import __version__, console
 from devcad.errors import DevcadError, JobError
+from devcad.interrupts import Interrupts
+from devcad.outcomes import work_through
 
 if TYPE_CHECKING:
     from devcad.job.load import Job
@@ -76,17 +74,20 @@ Examples:
   devcad export *.toml --pipeline sheet-metal --json"""
 )
 def export(
+    context: typer.Context,
     jobs: Jobs,
     pipeline: Pipeline = None,
     to: Annotated[
-        str, typer.Option(metavar="FORMATS", help="step,stl,glb,dxf,svg instead of the recipe's.")
-    ] = "",
+        str | None,
+        typer.Option(metavar="FORMATS", help="step,stl,glb,dxf,svg instead of the recipe's."),
+    ] = None,
     out: Annotated[str, typer.Option("-o", "--out", metavar="OUT", help="Folder.")] = "out",
     allow: Allow = None,
     as_json: AsJson = False,
 ) -> int:
     """Write OUT/<job>/ with the files of the recipe and report.json."""
     formats, allowed = _formats(to), _checks(allow)
+    _recipe(pipeline)
 
     def work(job: Job, progress: Progress) -> dict[str, Any]:
         from devcad import pipeline as spine
@@ -107,7 +108,7 @@ def export(
 
         return file_lines(report, out)
 
-    return _each(jobs, work, as_json, lines)
+    return work_through(jobs, work, as_json, lines, context.obj)
 
 
 @app.command(
@@ -117,10 +118,15 @@ Examples:
   devcad check *.toml --json"""
 )
 def check(
-    jobs: Jobs, pipeline: Pipeline = None, allow: Allow = None, as_json: AsJson = False
+    context: typer.Context,
+    jobs: Jobs,
+    pipeline: Pipeline = None,
+    allow: Allow = None,
+    as_json: AsJson = False,
 ) -> int:
     """Build and check the geometry; write nothing."""
     allowed = _checks(allow)
+    _recipe(pipeline)
 
     def work(job: Job, progress: Progress) -> dict[str, Any]:
         from devcad.pipeline import build
@@ -134,7 +140,7 @@ def check(
 
         return check_lines(report)
 
-    return _each(jobs, work, as_json, lines)
+    return work_through(jobs, work, as_json, lines, context.obj)
 
 
 @app.command(
@@ -191,44 +197,63 @@ def new(
 
 def run(arguments: Sequence[str]) -> int:
     """Run the command line and return its exit code; nothing is raised but SystemExit."""
-    if threading.current_thread() is threading.main_thread():
-        signal.signal(signal.SIGTERM, _terminated)
-    for stream in (sys.stdout, sys.stderr):
-        if hasattr(stream, "reconfigure"):
-            stream.reconfigure(errors="backslashreplace")
-    code = _guarded(arguments)
-    console.flush()
-    return code
+    console.settle()
+    interrupts = Interrupts()
+    try:
+        with interrupts.watched():
+            code = _guarded(arguments, interrupts)
+    except (KeyboardInterrupt, SystemExit):
+        if not interrupts.code:
+            raise
+        code = interrupts.code
+    return interrupts.code or code
 
 
-def _guarded(arguments: Sequence[str]) -> int:
+def _guarded(arguments: Sequence[str], interrupts: Interrupts) -> int:
     """The exit code of a command, every error told in its one line."""
+    try:
+        code = _commanded(arguments, interrupts)
+        console.flush()
+        return code
+    except (KeyboardInterrupt, typer.Abort):
+        return INTERRUPTED
+    except Exception as error:
+        interrupts.check()
+        format_message = getattr(error, "format_message", None)  # one of typer's usage errors
+        if format_message is not None:
+            error = JobError(_one_sentence(format_message()), remedy="see devcad --help")
+        failure = console.failure(error)
+        return max(failure.code, _told(failure, arguments))
+
+
+def _told(failure: DevcadError, arguments: Sequence[str]) -> int:
+    """Tell a failure of no one job, to programs too; the code of what then goes wrong, or 0."""
+    options = arguments[: arguments.index("--")] if "--" in arguments else arguments
+    try:
+        console.tell(failure)
+        if "--json" in options:
+            console.say_json([console.entry(failure, None)])
+            console.flush()
+    except DevcadError as error:
+        console.tell(error)
+        return error.code
+    return 0
+
+
+def _commanded(arguments: Sequence[str], interrupts: Interrupts) -> int:
+    """The exit code of a command that fails by raising."""
     try:
         with warnings.catch_warnings():
             if not console.debugging():  # a failure's stderr holds its error lines and nothing else
                 warnings.simplefilter("ignore")
             result = typer.main.get_command(app).main(
-                list(arguments), prog_name="devcad", standalone_mode=False
+                list(arguments), prog_name="devcad", standalone_mode=False, obj=interrupts
             )
         return result if isinstance(result, int) else 0
-    except (KeyboardInterrupt, typer.Abort):
-        return INTERRUPTED
     except SystemExit as leave:
         if leave.code == 1:  # typer's way to say that the reader of the help has gone
             return 0
         raise
-    except Exception as error:
-        format_message = getattr(error, "format_message", None)  # one of typer's usage errors
-        if format_message is not None:
-            error = JobError(_one_sentence(format_message()), remedy="see devcad --help")
-        failure = console.failure(error)
-        console.tell(failure)
-        return failure.code
-
-
-def _terminated(*_: object) -> NoReturn:
-    """Leave through the finally clauses, so that no staging folder stays."""
-    raise SystemExit(128 + signal.SIGTERM)
 
 
 def _one_sentence(message: str) -> str:
@@ -237,107 +262,17 @@ def _one_sentence(message: str) -> str:
     return f"usage: {message[:1].lower()}{message[1:]}"
 
 
-# --- jobs ----------------------------------------------------------------------------------
-
-
-@dataclass
-class _Outcome:
-    """What became of one job file of the command line."""
-
-    path: str
-    job: Job | None = None
-    report: dict[str, Any] | None = None
-    errors: list[DevcadError] = field(default_factory=list)
-
-    @property
-    def code(self) -> int:
-        return max((error.code for error in self.errors), default=0)
-
-    def entry(self) -> dict[str, Any]:
-        """The report, or what went wrong."""
-        if self.report is not None:
-            return self.report
-        return console.entry(self.errors[0], self.job.name if self.job else self.path)
-
-
-def _each(
-    paths: Sequence[str],
-    work: Callable[[Job, Progress], dict[str, Any]],
-    as_json: bool,
-    lines: Callable[[dict[str, Any]], Iterable[str]],
-) -> int:
-    """Load every job, then work on each; the exit code is the largest."""
-    outcomes = [_loaded(path) for path in paths]
-    twins = _refuse_twins(outcomes)
-    for outcome in outcomes:
-        if outcome.job is not None and not outcome.errors and not twins:
-            _work_on(outcome, outcome.job, work)
-        for error in outcome.errors:
-            console.tell(error)
-        if outcome.report is not None and not as_json:
-            for line in lines(outcome.report):
-                console.say(line)
-    if as_json:
-        done = [outcome.entry() for outcome in outcomes if outcome.report or outcome.errors]
-        console.say(json.dumps(done, indent=2, ensure_ascii=False, allow_nan=False))
-    return max(outcome.code for outcome in outcomes)
-
-
-def _loaded(path: str) -> _Outcome:
-    """The job of a path, or why there is none."""
-    outcome = _Outcome(path)
-    try:
-        from devcad.job.load import load
-
-        outcome.job = load(path)
-    except Exception as error:
-        outcome.errors = console.failures(error, path)
-    return outcome
-
-
-def _refuse_twins(outcomes: Sequence[_Outcome]) -> bool:
-    """Give every job whose name is taken an error; case-blind, as some file systems are."""
-    first: dict[str, str] = {}
-    for outcome in outcomes:
-        if outcome.job is None:
-            continue
-        name = outcome.job.name
-        if name.lower() not in first:
-            first[name.lower()] = outcome.path
-        else:
-            outcome.errors.append(
-                JobError(
-                    f'the name "{name}" is taken by {first[name.lower()]}; nothing was done',
-                    place=f"{outcome.path} > name",
-                    value=name,
-                    limit="one job of each name",
-                    remedy="rename one of the two, or run them one by one",
-                )
-            )
-    return any(outcome.job and outcome.errors for outcome in outcomes)
-
-
-def _work_on(outcome: _Outcome, job: Job, work: Callable[[Job, Progress], dict[str, Any]]) -> None:
-    from devcad.report.progress import ProgressLine
-
-    with ProgressLine() as progress:
-        try:
-            outcome.report = work(job, progress.show)
-        except Exception as error:
-            outcome.errors = console.failures(error, outcome.path)
-
-
 # --- usage ---------------------------------------------------------------------------------
 
 
-def _formats(text: str) -> list[str]:
-    """The formats of --to."""
+def _formats(text: str | None) -> list[str]:
+    """The formats of --to, none where it is not given."""
     from devcad.export import FORMATS
 
-    names = [name.strip() for name in text.split(",")] if text else []
+    names = [] if text is None else [name.strip() for name in text.split(",")]
     for name in names:
         if name not in FORMATS:
-            _usage(f'this version knows no format "{name}"', name, FORMATS)
+            _usage(f'this version knows no format "{name}"', name, FORMATS, "--to")
     return names
 
 
@@ -348,13 +283,25 @@ def _checks(allow: Sequence[str] | None) -> list[str]:
     names = [name.strip() for text in allow or () for name in text.split(",")]
     for name in names:
         if name not in NAMES:
-            _usage(f'this version knows no check "{name}"', name, NAMES)
+            _usage(f'this version knows no check "{name}"', name, NAMES, "--allow")
     return names
 
 
-def _usage(what: str, word: str, known: Iterable[str]) -> NoReturn:
+def _recipe(name: str | None) -> None:
+    """Refuse a --pipeline that there is not, before any job is read."""
+    if name is None:
+        return
+    from devcad.job.recipe import recipe_names
+
+    known = recipe_names()
+    if name not in known:
+        _usage(f'there is no pipeline "{name}"', name, known, "--pipeline")
+
+
+def _usage(what: str, word: str, known: Iterable[str], option: str = "") -> NoReturn:
     """The error of a word on the command line that is not among the known ones."""
     from devcad.job.invalid import did_you_mean
 
     names = list(known)
-    raise JobError(what, value=word, limit=", ".join(names), remedy=did_you_mean(word, names))
+    limit, remedy = ", ".join(names), did_you_mean(word, names)
+    raise JobError(what, place=option, value=word, limit=limit, remedy=remedy)

@@ -60,8 +60,12 @@ class GeometryError(DevcadError, ValueError):
     code = 3
 
 
+@dataclass(eq=False)
 class CheckFailed(DevcadError, ValueError):
-    """The part was built, but one of its checks does not hold."""
+    """The part was built, but one of its checks does not hold; ``t`` is where, if known."""
+
+    check: str = ""
+    t: float | None = None
 
     code = 3
 

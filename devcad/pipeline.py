@@ -11,7 +11,7 @@ from devcad.assemble import PanelSpec, assemble
 from devcad.checks import require
 from devcad.errors import DevcadError
 from devcad.export import Options, Written, writer
-from devcad.export.folder import published
+from devcad.export.folder import published, unwritable
 from devcad.job.load import Job, JobPanel, load
 from devcad.job.recipe import Recipe, known_checks, known_formats, resolve
 from devcad.part import Panel, Part
@@ -24,6 +24,8 @@ Progress = Callable[[str], None]
 
 MESHES = {"stl", "glb"}
 """The formats that carry a panel's triangles."""
+CUTTING = ("gap", "cut")
+"""The keys of a surface that only the assembly can judge; its errors begin with their names."""
 DEFAULT_FORMATS = ("step", "stl", "glb", "dxf", "svg")
 
 
@@ -43,8 +45,9 @@ def plan(
     Raises:
         JobError: no such recipe, format or check.
     """
+    chosen, allowed = known_formats(list(formats)), known_checks(list(allow))
     try:
-        return resolve(pipeline or job.pipeline, job.recipe, formats=formats, allow=allow)
+        return resolve(pipeline or job.pipeline, job.recipe, formats=chosen, allow=allowed)
     except DevcadError as error:
         raise error.at(place="" if pipeline else f"{job.path} > pipeline") from None
 
@@ -81,7 +84,7 @@ def build(
             allow=recipe.allow,
         )
     except DevcadError as error:
-        raise error.at(place=job.path) from None
+        raise _placed(error, job) from None
     return replace(
         part,
         panels=tuple(_weighed(panel, sheet) for panel in part.panels),
@@ -116,7 +119,7 @@ def export(
         written: list[Written] = []
         for name in chosen:
             progress(f"{part.name}: {name}")
-            written += writer(name)(part, folder, options or Options())
+            written += _written(part, name, folder, options or Options(), Path(out))
         checks = [*part.checks, *(check for file in written for check in file.checks)]
         if MESHES.intersection(chosen):
             solids = (panel for panel in part.panels if panel.mesh.watertight)
@@ -126,6 +129,31 @@ def export(
         report = make_report(part, checks=checks, files=written, svg_origin=origin)
         (folder / "report.json").write_bytes(to_bytes(report))
     return report
+
+
+def _written(part: Part, name: str, folder: Path, options: Options, out: Path) -> list[Written]:
+    """The files of one format; a disk that is full is told with the file and the folder."""
+    write = writer(name)
+    try:
+        return write(part, folder, options)
+    except DevcadError:
+        raise
+    except OSError as error:
+        file = "" if error.filename else f"{part.name}.{name}"
+        raise unwritable(out / part.name, error, file) from error
+
+
+def _placed(error: DevcadError, job: Job) -> DevcadError:
+    """The error of an assembly, at the key of the surface that it speaks of, else at the job."""
+    key, colon, rest = error.what.partition(": ")
+    if error.place or not colon or key not in CUTTING:
+        return error.at(place=job.path)
+    where = job.path
+    if not job.single:
+        where = f"{job.path} > panel {error.panel or job.panels[0].name}"
+        error.panel = ""
+    error.what = rest
+    return error.at(place=f"{where} > surface.{key}")
 
 
 def _specs(panel: JobPanel, job: Job) -> list[PanelSpec]:

@@ -6,15 +6,23 @@ import numpy as np
 
 from devcad.checks import Check, Where, at_most
 from devcad.flatten.development import Development
-from devcad.flatten.outline import integral
+from devcad.flatten.outline import integral, surface_area
 from devcad.flatten.verify import fold_back, isometry, overlap_area
 from devcad.geometry.chain import Chain
 from devcad.geometry.classify import EXACT
 from devcad.geometry.layers import at_apex
 from devcad.geometry.patch import Frame, Patch
-from devcad.geometry.regularity import Extreme, clearance, smallest_radius, twist
+from devcad.geometry.regularity import (
+    STRAIGHT,
+    Clearance,
+    Extreme,
+    clearance,
+    smallest_radius,
+    twist,
+)
 from devcad.geometry.taylor import Array
 from devcad.mesh.build import volume
+from devcad.mesh.mesh import Mesh
 from devcad.part import Panel
 
 TWIST_LIMIT_DEG = 0.01
@@ -79,17 +87,9 @@ def _twist(name: str, chain: Chain) -> Check:
 
 def _regular(name: str, chain: Chain, layers: tuple[float, ...], *, reaches_apex: bool) -> Check:
     stands = [(p, clearance(p, layers, to_apex=reaches_apex)) for p in chain.patches]
-    patch, worst = min(stands, key=lambda pair: pair[1].value)
+    patch, worst = min(stands, key=lambda pair: (pair[1].value, pair[1].touches))
     thick = layers != (0.0,)
     passed = worst.value > 0.0 or (worst.touches and not thick)
-    crossing = "crosses" if worst.value < 0.0 else "lies on"
-    layer = "a skin of the sheet" if thick else "the extent"
-    says = (
-        f"{layer} {crossing} the regression curve at t = {worst.t:.6g}: "
-        f"{worst.value:.4g} mm along the ruling"
-    )
-    if worst.value == 0.0 and not worst.touches:
-        says = f"the ruling at t = {worst.t:.6g} is singular all along: the front turns over there"
     return Check(
         "regular",
         name,
@@ -98,20 +98,48 @@ def _regular(name: str, chain: Chain, layers: tuple[float, ...], *, reaches_apex
         "mm",
         passed,
         _where(patch, Extreme(worst.value, worst.t, worst.v)),
-        says,
-        _regular_remedy(patch, worst.t, thick=thick),
+        _irregular(patch, worst, thick=thick),
+        _regular_remedy(patch, worst, thick=thick),
     )
 
 
-def _regular_remedy(patch: Patch, t: float, *, thick: bool) -> str:
-    """Where the regression curve lies, as a limit for the extent."""
+def _irregular(patch: Patch, worst: Clearance, *, thick: bool) -> str:
+    """How the sheet comes to be singular, in words."""
+    if worst.value == -np.inf:
+        return f"the ruling at t = {worst.t:.6g} has no tangent plane: nothing turns there"
+    if worst.value == 0.0 and not worst.touches:
+        return f"the ruling at t = {worst.t:.6g} is singular all along: the front turns over there"
+    layer = "a skin of the sheet" if thick else "the extent"
+    if _edge_height(patch, worst.t) is None:
+        return (
+            f"{layer} reaches its centre of curvature at t = {worst.t:.6g}: {worst.value:.4g} mm "
+            "are left on the inside of the bend"
+        )
+    crossing = "crosses" if worst.value < 0.0 else "lies on"
+    return (
+        f"{layer} {crossing} the regression curve at t = {worst.t:.6g}: "
+        f"{worst.value:.4g} mm along the ruling"
+    )
+
+
+def _edge_height(patch: Patch, t: float) -> float | None:
+    """v of the regression curve at t; None where the ruling does not turn."""
     frame = patch.frame([t])
     a, q = float(frame.a[0]), float(frame.q[0])
-    if not np.isfinite(a) or abs(a) <= 1e-14 * abs(q) or (a == 0.0 and q == 0.0):
-        return "bend less sharply, or use a thinner sheet" if thick else "split the curve there"
+    reach = max(abs(float(frame.v_from[0])), abs(float(frame.v_to[0])))
+    if not np.isfinite(a) or abs(a) * reach <= STRAIGHT * (abs(q) + abs(a) * reach):
+        return None
+    return -q / a if abs(q) > EXACT * abs(a) * reach else 0.0
+
+
+def _regular_remedy(patch: Patch, worst: Clearance, *, thick: bool) -> str:
+    """Where the regression curve lies, as a limit for the extent."""
+    if worst.value == 0.0 and not worst.touches:
+        return "split the curve there"
+    edge = _edge_height(patch, worst.t)
+    if edge is None:
+        return "bend less sharply, or use a thinner sheet" if thick else "give a curve that bends"
     thinner = ", or use a thinner sheet" if thick else ""
-    size = abs(float(frame.v_from[0])) + abs(float(frame.v_to[0]))
-    edge = -q / a if abs(q / a) > EXACT * size else 0.0
     return f"keep the extent on one side of v = {edge:.6g} mm there{thinner}"
 
 
@@ -175,14 +203,23 @@ def _bend_radius(name: str, middle: Chain, thickness: float, limit: float) -> Ch
 
 
 def sheet_volume(panel: Panel) -> float:
-    """The exact volume of a panel in mm3: area x thickness, 0 without thickness.
+    """The exact volume of a panel in mm3: area x thickness and what an apex adds."""
+    return panel.pattern.area * panel.thickness + _tips(panel.chain, panel.thickness)
 
-    At an apex every layer ends by itself where q + v a = d c, which adds
-    (T^3 / 24) * integral of c^2 / |a| dt (design.md, section 7).
-    """
-    thickness = panel.thickness
-    total = panel.pattern.area * thickness
-    for patch in panel.chain.patches if thickness else ():
+
+def volume_error(mesh: Mesh, chain: Chain, thickness: float) -> float:
+    """How far a solid's mesh is from the sheet's volume, per unit of its area, mm; 0 of a sheet."""
+    if not mesh.watertight:
+        return 0.0
+    area = sum(surface_area(patch) for patch in chain.patches)
+    return abs(volume(mesh) - area * thickness - _tips(chain, thickness)) / area
+
+
+def _tips(chain: Chain, thickness: float) -> float:
+    """At an apex every layer ends by itself where q + v a = d c, which adds
+    (T^3 / 24) * integral of c^2 / |a| dt (design.md, section 7)."""
+    total = 0.0
+    for patch in chain.patches if thickness else ():
         frame = patch.frame(np.linspace(*patch.domain, 17)[1:-1])
         if at_apex(frame, frame.v_from) or at_apex(frame, frame.v_to):
             total += thickness**3 / 24.0 * integral(patch, _tip_density)
@@ -195,12 +232,13 @@ def _tip_density(frame: Frame) -> Array:
 
 def mesh_volume(panel: Panel, tolerance: float) -> Check:
     """The check ``volume`` of a solid's mesh: the exact volume, within area x tolerance."""
-    value = abs(volume(panel.mesh) - sheet_volume(panel))
+    area = panel.pattern.area
+    value = area * volume_error(panel.mesh, panel.chain, panel.thickness)
     return at_most(
         "volume",
         panel.name,
         value,
-        panel.pattern.area * tolerance,
+        area * tolerance,
         "mm3",
         says=f"the mesh holds {value:.4g} mm3 more or less than the sheet",
         remedy="give a finer tolerance",

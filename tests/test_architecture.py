@@ -28,7 +28,8 @@ LAYERS: list[set[str]] = [
     {"report"},
     {"pipeline"},
     {"batch", "interop"},
-    {"console"},
+    {"console", "interrupts"},
+    {"outcomes"},
     {"cli"},
     {"__main__"},
 ]

@@ -94,7 +94,10 @@ def test_a_broken_file_is_told_to_programs_too(
     assert run(["check", str(path), "--json"]) == code
     (entry,) = json.loads(capsys.readouterr().out)
     assert set(entry) == {"job", "error"}
-    assert list(entry["error"]) == ["code", "place", "value", "limit", "remedy", "message"]
+    keys = ["code", "place", "value", "limit", "remedy", "message", "check", "t"]
+    assert list(entry["error"]) == keys
+    assert entry["job"] == str(path)
+    assert entry["error"]["message"].startswith(f"{entry['error']['place']}: ")
     assert entry["error"]["code"] == code
     assert entry["error"]["place"].startswith(str(path))
 

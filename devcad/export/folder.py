@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import ctypes
+import json
 import os
+import re
 import secrets
 import shutil
 import sys
@@ -15,6 +17,9 @@ from devcad.errors import DevcadError, FileError
 
 AT_FDCWD, RENAME_EXCHANGE = -100, 2  # linux/fcntl.h, linux/fs.h
 ATTEMPTS = 16  # another process may publish the same folder between two of our steps
+REPORT = "report.json"
+LITTER = {".DS_Store", "Thumbs.db", "desktop.ini"}
+"""What file managers put into every folder that is looked at."""
 
 
 @contextmanager
@@ -22,54 +27,196 @@ def published(out: Path, name: str) -> Iterator[Path]:
     """A staging folder beside OUT/name, which it replaces when the block ends well.
 
     Whatever ends the block otherwise, an interrupt included, removes the staging folder and
-    leaves OUT/name as it was. Files are synchronised to the disk before the rename.
+    leaves OUT/name as it was. Files are synchronised to the disk before the rename. Staging
+    folders that a killed process left behind are removed first.
 
     Raises:
-        FileError: OUT cannot be written, or OUT/name is there and is not an export of ``name``.
+        FileError: OUT cannot be written, or OUT/name holds something that its report does not
+        list.
     """
     target = out / name
-    fresh = not out.exists()
-    staging = out / f".{name}-{secrets.token_hex(8)}.part"
-    done = False
+    fresh = done = False
     try:
+        _refuse_file_in_the_way(out)
         _refuse_foreign(target)
+        fresh = not out.exists()
         out.mkdir(parents=True, exist_ok=True)
-        staging.mkdir()
-        yield staging
-        _synchronise(staging)
-        _replace(staging, target)
-        done = True
+        with _staging(out, name) as staging:
+            yield staging
+            _synchronise(staging)
+            _refuse_foreign(target)  # again: it may have come while we wrote
+            _replace(staging, target)
+            done = True
     except DevcadError:
         raise
     except OSError as error:
-        raise _unwritable(target, error.strerror or str(error)) from error
+        raise unwritable(target, error) from error
     finally:
-        shutil.rmtree(staging, ignore_errors=True)
         if fresh and not done:
             with suppress(OSError):
                 out.rmdir()
 
 
+def unwritable(target: Path, error: OSError, file: str = "") -> FileError:
+    """The error of a folder, or of a file in it, that the system did not let us write."""
+    reason = error.strerror or str(error)
+    named = file or (Path(os.fsdecode(error.filename)).name if error.filename else "")
+    what = f"cannot write {named}" if named else "cannot write the folder"
+    return _refused(target, f"{what}: {reason}", reason)
+
+
+def _refused(target: Path, what: str, value: str, remedy: str = "") -> FileError:
+    remedy = remedy or "choose another folder with -o"
+    return FileError(what, place=str(target), value=value, remedy=remedy)
+
+
+# --- what must not be replaced -------------------------------------------------------------
+
+
+def _refuse_file_in_the_way(out: Path) -> None:
+    """FileError where OUT, or a folder it stands in, is a file."""
+    for path in (out, *out.parents):
+        if path.exists() and not path.is_dir():
+            what = f"{path} is a file, not a folder"
+            raise FileError(what, value=str(path), remedy="choose another folder with -o")
+
+
 def _refuse_foreign(target: Path) -> None:
-    """FileError where the target holds something that an export of this name never wrote."""
+    """FileError where the target holds something that the export in it did not write."""
     if target.is_symlink() or (target.exists() and not target.is_dir()):
-        raise _unwritable(target, "it is there already and is not a folder")
-    if not target.is_dir() or (target / "report.json").is_file():
-        return
-    strange = sorted(
-        path.name for path in target.iterdir() if not path.name.startswith(target.name)
-    )
+        what = "cannot write the folder: it is there already and is not a folder"
+        raise _refused(target, what, target.name)
+    strange = _strange(target)
     if strange:
-        raise _unwritable(target, f'it is no export of devcad: it holds "{strange[0]}"')
+        raise _refused(
+            target,
+            f'cannot replace the folder: it holds "{strange[0]}", which no export put there',
+            strange[0],
+            "move it elsewhere, or choose another folder with -o",
+        )
 
 
-def _unwritable(target: Path, reason: str) -> FileError:
-    return FileError(
-        f"cannot write the folder: {reason}",
-        place=str(target),
-        value=reason,
-        remedy="choose another folder with -o",
-    )
+def _strange(target: Path) -> list[str]:
+    """The entries of a folder that its report does not list, sorted.
+
+    Another process may replace the folder while we look: then we look again.
+    """
+    found: list[str] = []
+    for _ in range(ATTEMPTS):
+        before = _identity(target)
+        if before is None:
+            return []
+        found = _unlisted(target)
+        if not found or _identity(target) == before:
+            return found
+    return found
+
+
+def _identity(folder: Path) -> tuple[int, int] | None:
+    """What tells a folder from another one of its name; None where there is none."""
+    try:
+        status = folder.stat()
+    except FileNotFoundError:
+        return None
+    return status.st_dev, status.st_ino
+
+
+def _unlisted(target: Path) -> list[str]:
+    """The entries of a folder that its report does not list; a bad report lists nothing."""
+    with suppress(FileNotFoundError):
+        entries = sorted(target.iterdir())
+        listed = _listed(target / REPORT) | LITTER
+        return [path.name for path in entries if path.name not in listed or path.is_dir()]
+    return []
+
+
+def _listed(report: Path) -> set[str]:
+    """The names of the files that a report speaks of, its own included."""
+    try:
+        files = json.loads(report.read_bytes())["files"]
+        return {REPORT, *(str(file["path"]) for file in files)}
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        return set()
+
+
+# --- staging -------------------------------------------------------------------------------
+
+
+@contextmanager
+def _staging(out: Path, name: str) -> Iterator[Path]:
+    """A new hidden folder in OUT, locked while its process lives, removed at the end.
+
+    The lock on OUT keeps another process from sweeping the folder before it is locked itself.
+    """
+    path = out / f".{name}-{secrets.token_hex(8)}.part"
+    lock = None
+    try:
+        outer = _lock(out)
+        try:
+            if outer is not None:
+                _sweep(out, name)
+            path.mkdir()
+            lock = _lock(path)
+        finally:
+            _unlock(outer)
+        yield path
+    finally:
+        shutil.rmtree(path, ignore_errors=True)
+        _unlock(lock)
+
+
+def _sweep(out: Path, name: str) -> None:
+    """Remove the staging folders of this name whose process has died: nobody locks them."""
+    pattern = re.compile(rf"\.{re.escape(name)}-[0-9a-f]{{16}}\.part")
+    for path in out.iterdir():
+        if not pattern.fullmatch(path.name) or path.is_symlink():
+            continue
+        lock = _lock_at_once(path)
+        if lock is not None:
+            shutil.rmtree(path, ignore_errors=True)
+            _unlock(lock)
+
+
+def _lock(folder: Path) -> int | None:
+    """A handle that locks a folder, after waiting for it; None where the system cannot."""
+    if sys.platform == "win32":
+        return None
+    import fcntl
+
+    return _flocked(folder, fcntl.LOCK_EX)
+
+
+def _lock_at_once(folder: Path) -> int | None:
+    """A handle that locks a folder; None where another has the lock or the system cannot."""
+    if sys.platform == "win32":
+        return None
+    import fcntl
+
+    return _flocked(folder, fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+
+def _flocked(folder: Path, how: int) -> int | None:
+    """A handle with that lock; the system drops it with the process, whatever ends that."""
+    import fcntl
+
+    try:
+        handle = os.open(folder, os.O_RDONLY)
+    except OSError:
+        return None
+    try:
+        fcntl.flock(handle, how)
+    except OSError:
+        os.close(handle)
+        return None
+    return handle
+
+
+def _unlock(handle: int | None) -> None:
+    if handle is not None:
+        os.close(handle)
+
+
+# --- the rename ----------------------------------------------------------------------------
 
 
 def _synchronise(folder: Path) -> None:

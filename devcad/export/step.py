@@ -64,16 +64,16 @@ def _body(panel: Panel, tolerance: float, degree: int) -> Body:
 
 def _checks(panel: Panel, plan: Body, proof: Proof, tolerance: float) -> list[Check]:
     """What is stated about one body."""
-    limit = max(tolerance, FLOOR * panel_size(panel))
+    reach = FLOOR * panel_size(panel)
     checks = [
         at_most(
             "step-deviation",
             panel.name,
             proof.deviation,
-            limit,
+            tolerance,
             "mm",
-            says="the STEP faces leave the true surface",
-            remedy="raise step.tolerance",
+            says=f"the STEP faces leave the true surface by {proof.deviation:.3g} mm",
+            remedy=f"raise step.tolerance; no fit of this size comes within {reach:.2g} mm",
         ),
         at_most(
             "step-twist",
@@ -81,7 +81,7 @@ def _checks(panel: Panel, plan: Body, proof: Proof, tolerance: float) -> list[Ch
             float(np.degrees(proof.twist)),
             float(np.degrees(TWIST_LIMIT)),
             "deg",
-            says="the STEP faces twist along a ruling",
+            says=f"the STEP faces twist by {np.degrees(proof.twist):.3g} deg along a ruling",
             remedy="lower step.tolerance",
         ),
     ]
@@ -94,7 +94,7 @@ def _checks(panel: Panel, plan: Body, proof: Proof, tolerance: float) -> list[Ch
                 share,
                 VOLUME_LIMIT,
                 "relative",
-                says="the STEP solid's volume is not area x thickness",
+                says=f"the STEP solid's volume is off area x thickness by {share:.3g}",
                 remedy="lower step.tolerance, or reduce the thickness",
             )
         )

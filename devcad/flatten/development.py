@@ -82,19 +82,20 @@ def develop(patch: Patch) -> Development:
 
     def sample(t: Array, _low: float, _high: float) -> Array:
         frame = patch.frame(t)
-        return np.column_stack([frame.a, frame.p, frame.q, frame.c])
+        reach = np.maximum(np.abs(frame.v_from), np.abs(frame.v_to))
+        return np.column_stack([frame.a, frame.p, frame.q, frame.c, reach * frame.a])
 
     def lift(raw: Array, half: float) -> Array:
-        a, p, q, c = raw.T
+        a, p, q, c, _ = raw.T
         omega = half * (chebyshev.integration_of_values(len(a)) @ a)
         cos, sin = np.cos(omega), np.sin(omega)
         return np.column_stack([a, p * cos - q * sin, p * sin + q * cos, c])
 
     def scale(raw: Array) -> Array:
-        # an angle is zero below rounding of a radian, a length below rounding of the base curve;
+        # an angle is zero below rounding of a radian, a length below rounding of the strip's own;
         # the bending is no part of the shape and folds back within 1e-8: 1e-12 is enough for it
         seen = np.abs(raw).max(axis=0)
-        length = max(seen[1], seen[2])
+        length = max(seen[1], seen[2], seen[4])
         return np.array([1.0 / span, length, length, 100.0 * max(seen[3], 1.0 / span)])
 
     rates = chebyshev.resolve_by(sample, lift, knots, scale=scale)

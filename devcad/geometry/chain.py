@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from devcad.errors import GeometryError, JobError
-from devcad.geometry import taylor
 from devcad.geometry.patch import Patch, RulingJet
 from devcad.geometry.taylor import Array
 
@@ -149,12 +148,13 @@ def with_gap(chain: Chain, gap: float) -> Chain:
 
     low, high = last.domain
     grid = np.linspace(low, high, 257)
-    wide = [s for s in grid[::-1] if width(float(s)) >= gap]
+    widths = [width(float(s)) for s in grid]
+    wide = [s for s, w in zip(grid[::-1], widths[::-1], strict=True) if w >= gap]
     if not wide:
         raise JobError(
-            f"gap: {gap:.6g} mm is wider than the last patch, {width(low):.6g} mm",
+            f"gap: {gap:.6g} mm is wider than the last patch reaches, {max(widths):.6g} mm",
             value=gap,
-            limit=width(low),
+            limit=max(widths),
             remedy="choose a narrower gap, or begin the curve elsewhere",
         )
     low = float(wide[0])
@@ -163,56 +163,6 @@ def with_gap(chain: Chain, gap: float) -> Chain:
         low, high = (middle, high) if width(middle) >= gap else (low, middle)
     kept = last.restricted(last.domain[0], low)
     return replace(chain, patches=(*chain.patches[:-1], kept), closing=None, gap=gap)
-
-
-def parallel_chain(chain: Chain, distance: float) -> Chain:
-    """The parallel surface of a chain, creases kept: every patch moved by ``distance`` along n.
-
-    At a crease the neighbours' parallel planes meet on the mitre, so both are lengthened or
-    shortened to it: done for prisms (parallel rulings), where the rails stay what they were.
-
-    Raises:
-        GeometryError: a crease between patches that are not the walls of a prism.
-    """
-    around = [chain.closing, *chain.joints, chain.closing]
-    moved = []
-    for k, patch in enumerate(chain.patches):
-        before, after = around[k], around[k + 1]
-        creased = [j for j in (before, after) if j is not None and not j.smooth]
-        parallel = patch.parallel(distance)
-        if creased:
-            frame = patch.frame(np.linspace(*patch.domain, 9)[1:-1])
-            if np.abs(frame.a).max() > SMOOTH or np.abs(frame.c).max() > SMOOTH:
-                raise GeometryError(
-                    "the thickness cannot be laid on one side of a crease between curved or "
-                    "tapering faces",
-                    remedy='describe the middle surface: reference = "middle"',
-                )
-            lean = [
-                0.0 if j is None else sign * np.tan(0.5 * j.angle)
-                for j, sign in ((before, 1.0), (after, -1.0))
-            ]
-            parallel = _stretched(patch, distance, lean[0], lean[1])
-        moved.append(parallel)
-    again = link(tuple(moved), base_closed=chain.closes is not None, tolerance=np.inf)
-    return again if chain.closed else replace(chain, patches=again.patches, joints=again.joints)
-
-
-def _stretched(patch: Patch, distance: float, first: float, last: float) -> Patch:
-    """A prism's wall moved along n, its ends moved along m by distance * (first, last)."""
-    low, high = patch.domain
-
-    def field(t: Array, order: int) -> RulingJet:
-        frame = patch.frame_jet(t, order)
-        share = taylor.variable(t, order)
-        share[0] = (share[0] - low) / (high - low)
-        share[1:] /= high - low
-        along = (last - first) * share
-        along[0] += first
-        c0 = frame.ruling.c0 + distance * (frame.n + taylor.mul(along, frame.m))
-        return replace(frame.ruling, c0=c0)
-
-    return replace(patch, field=field)
 
 
 def _merged(first: Patch, second: Patch) -> Patch:

@@ -70,6 +70,12 @@ def patch_size(frame: Frame) -> float:
     return float(np.linalg.norm(ends.max(axis=0) - ends.min(axis=0)))
 
 
+def patch_box(patch: Patch) -> Array:
+    """The bounding box (2, 3) of the patch, from samples, mm."""
+    ends = _ends(patch.frame(sample_parameters(patch, 33)))
+    return np.stack([ends.min(axis=0), ends.max(axis=0)])
+
+
 def _ends(frame: Frame) -> Array:
     return np.concatenate(
         [frame.c0 + frame.v_from[:, None] * frame.e, frame.c0 + frame.v_to[:, None] * frame.e]

@@ -6,7 +6,7 @@ import numpy as np
 
 from devcad.geometry.chain import Chain, Joint
 from devcad.geometry.classify import EXACT
-from devcad.geometry.patch import Frame
+from devcad.geometry.patch import Frame, Patch
 from devcad.geometry.taylor import Array
 
 
@@ -23,8 +23,7 @@ def layer_ends(chain: Chain, number: int, frame: Frame, distance: float) -> tupl
     offset = distance * frame.n
     if distance:
         for row, joint in zip((0, -1), _joints_of(chain, number), strict=True):
-            if joint is not None and not joint.smooth:
-                offset[row] = distance * _mitre(frame, row, joint)
+            offset[row] = distance * mitre(frame, row, joint)
     return _rail(frame, frame.v_from, offset, distance), _rail(frame, frame.v_to, offset, distance)
 
 
@@ -47,8 +46,26 @@ def _joints_of(chain: Chain, number: int) -> tuple[Joint | None, Joint | None]:
     return before, chain.closing if last else chain.joints[number]
 
 
-def _mitre(frame: Frame, row: int, joint: Joint) -> Array:
-    """(n1 + n2) / (1 + n1.n2) from one side: n turned half the crease towards the other side."""
-    half = 0.5 * joint.angle if row == -1 else -0.5 * joint.angle
+def mitre(frame: Frame, row: int, joint: Joint | None) -> Array:
+    """Where the layer at distance 1 meets its neighbour's across a joint, (3,).
+
+    (n1 + n2) / (1 + n1.n2), from one side: n turned by half the crease towards the other side.
+    ``row`` is 0 for the joint before the frame and -1 (or 1 of two) for the one after; without
+    a crease it is n.
+    """
+    if joint is None or joint.smooth:
+        return np.asarray(frame.n[row])
+    half = -0.5 * joint.angle if row == 0 else 0.5 * joint.angle
     # turning about e carries m towards n, hence n towards -m
     return np.asarray(frame.n[row] - np.tan(half) * frame.m[row])
+
+
+def straight_sided(patch: Patch) -> bool:
+    """Whether both rails are straight lines within 1e-9 of their length."""
+    jet = patch.jet(np.linspace(*patch.domain, 9), 0)
+    for rail in (jet.rail(jet.v_from)[0], jet.rail(jet.v_to)[0]):
+        chord = rail[-1] - rail[0]
+        away = np.linalg.norm(np.cross(rail - rail[0], chord), axis=1)
+        if away.max() > EXACT * float(chord @ chord):
+            return False
+    return True

@@ -19,6 +19,8 @@ from devcad.geometry.taylor import Array, rows_cross, rows_dot
 
 INSIDE = 1e-3
 """Where P_t x e vanishes at an end, the twist is read at this share of the extent inside."""
+STRAIGHT = 1e-14
+"""A ruling that turns by less than this share of the width across it does not turn."""
 PER_SEGMENT = 65
 """Samples of a smooth segment in the search for a worst place."""
 
@@ -107,8 +109,9 @@ def clearance(patch: Patch, layers: tuple[float, ...], *, to_apex: bool = False)
             width = width.max(axis=0, keepdims=True)
         layered = np.stack([width - d * frame.c for d in layers])  # (layers, ends, n)
         low = layered.min(axis=(0, 1))
+        low = np.where(np.abs(low) <= EXACT * scale, 0.0, low)
         # a ruling whose direction does not turn has its regression point at infinity
-        turns = np.abs(frame.a) * (np.abs(ends).max(axis=0) + 1.0) > 1e-14 * scale
+        turns = np.abs(ends * frame.a).max(axis=0) > STRAIGHT * scale
         # where the ruling does not turn, only the bending can make a layer singular: then the
         # distance is how far the layer's centre of curvature is from it
         with np.errstate(all="ignore"):
@@ -136,7 +139,14 @@ def _turnover(patch: Patch) -> float | None:
     bending = 0.5 * (np.abs(frame.c[1:]) + np.abs(frame.c[:-1])) * step
     cosine = np.clip(rows_dot(frame.n[1:], frame.n[:-1]), -1.0, 1.0)
     jump = np.flatnonzero(np.arccos(cosine) > 1.0 + 2.0 * bending)
-    return float(0.5 * (t[jump[0]] + t[jump[0] + 1])) if len(jump) else None
+    if not len(jump):
+        return None
+    low, high, before = float(t[jump[0]]), float(t[jump[0] + 1]), frame.n[jump[0]]
+    for _ in range(40):
+        middle = 0.5 * (low + high)
+        same = bool(patch.frame([middle]).n[0] @ before > 0.0)
+        low, high = (middle, high) if same else (low, middle)
+    return 0.5 * (low + high)
 
 
 def smallest_radius(patch: Patch) -> Extreme:

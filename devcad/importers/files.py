@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import stat
 from pathlib import Path, PurePosixPath, PureWindowsPath
 
 from devcad.errors import FileError, JobError, LimitError
@@ -11,9 +12,13 @@ def read_bytes(path: Path, *, limit: int, place: str) -> bytes:
     """The content of a file, at most ``limit`` bytes.
 
     Raises:
-        FileError where it is missing or unreadable, LimitError where it is larger.
+        FileError where it is missing, unreadable or no regular file (a pipe would have us wait),
+        LimitError where it is larger.
     """
     try:
+        mode = path.stat().st_mode
+        if not stat.S_ISREG(mode) and not stat.S_ISDIR(mode):
+            raise OSError(0, "it is no regular file")
         with path.open("rb") as stream:
             data = stream.read(limit + 1)
     except (OSError, ValueError) as error:  # ValueError: a NUL in the name

@@ -7,6 +7,7 @@ import re
 from devcad.errors import JobError
 
 COLUMNS = 3
+_BEGINS = re.compile(r"[+-]?\.?\d", re.ASCII)
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 
 
@@ -14,7 +15,8 @@ def parse_points(text: str, *, place: str) -> list[list[float]]:
     """The points of a CSV text, n rows of (x, y, z) in the file's own unit.
 
     Columns are separated by commas, or by semicolons if the first line has one; decimals are
-    written with a point. A first line without any number is a header; empty lines are skipped.
+    written with a point. A first line where no cell begins like a number is a header; empty lines
+    are skipped.
 
     Raises:
         JobError with the line number where a row has not three finite numbers, or there is none.
@@ -23,7 +25,7 @@ def parse_points(text: str, *, place: str) -> list[list[float]]:
     lines = [(k, line) for k, line in lines if line]
     separator = ";" if lines and ";" in lines[0][1] else ","
     rows = [(k, [cell.strip() for cell in line.split(separator)]) for k, line in lines]
-    if rows and not any(_NUMBER.fullmatch(cell) for cell in rows[0][1]):
+    if rows and not any(_BEGINS.match(cell) for cell in rows[0][1]):
         rows = rows[1:]
     if not rows:
         raise JobError(
@@ -44,7 +46,7 @@ def _row(cells: list[str], place: str) -> list[float]:
             place=place,
             value=len(cells),
             limit=COLUMNS,
-            remedy="write x, y and z, separated by commas or by semicolons",
+            remedy="write x, y and z, decimals with a point, between commas or semicolons",
         )
     for cell in cells:
         if not _NUMBER.fullmatch(cell) or float(cell) in (float("inf"), float("-inf")):

@@ -11,6 +11,9 @@ if TYPE_CHECKING:
     from pydantic import BaseModel, ValidationError
 
 SHOWN = 60  # characters of a wrong value that a message repeats
+NEAR = 0.6  # likeness of two words, 1 for equal ones
+NEAR_SHORT = 0.7  # of words up to SHORT letters; pdf and dxf have 2/3
+SHORT = 4
 MOST = 20  # problems told of one file
 
 
@@ -43,9 +46,20 @@ def problems(
     ``tree`` is what was validated; ``place`` names the file and the table that it stands in.
     """
     groups: dict[str, list[Mapping[str, Any]]] = {}
-    for item in found.errors(include_url=False):
-        groups.setdefault(_path(tree, item), []).append(item)
+    for item in _once(found.errors(include_url=False), model):
+        groups.setdefault(_path(tree, item, model), []).append(item)
     return [_problem(items, model, place, path) for path, items in groups.items()]
+
+
+def _once(items: Sequence[Mapping[str, Any]], model: type[BaseModel]) -> list[Mapping[str, Any]]:
+    """The findings without the keys that are missing because they are mistyped."""
+    meant: set[tuple[str | int, ...]] = set()
+    for item in items:
+        if item["type"] == "extra_forbidden":
+            *table, key = item["loc"]
+            nearest = _nearest(str(key), _known_keys(model, table))
+            meant.update((*table, name) for name in nearest)
+    return [item for item in items if item["type"] != "missing" or item["loc"] not in meant]
 
 
 def below(place: str, path: str) -> str:
@@ -58,11 +72,17 @@ def below(place: str, path: str) -> str:
 
 def did_you_mean(word: str, known: Iterable[str]) -> str:
     """A remedy that names the nearest known word, or all of them."""
+    names = sorted(set(known))
+    close = _nearest(word, names)
+    return f'did you mean "{close[0]}"?' if close else f"known: {', '.join(names)}"
+
+
+def _nearest(word: str, names: Sequence[str]) -> list[str]:
+    """The one known word that is near enough to be meant, or none."""
     from difflib import get_close_matches  # only failures need it
 
-    names = sorted(known)
-    close = get_close_matches(word.lower(), names, n=1)
-    return f'did you mean "{close[0]}"?' if close else f"known: {', '.join(names)}"
+    cutoff = NEAR if len(word) > SHORT else NEAR_SHORT
+    return get_close_matches(word.lower(), names, n=1, cutoff=cutoff)
 
 
 def shown(value: Any) -> str:
@@ -86,14 +106,18 @@ def _clip(text: str) -> str:
     return text if text.isprintable() else ascii(text)[1:-1]
 
 
-def _path(tree: Any, item: Mapping[str, Any]) -> str:
+def _path(tree: Any, item: Mapping[str, Any], model: type[BaseModel]) -> str:
     """The location as a dotted path of the file; names of union members are left out.
 
     An entry that an array lacks is told of the array.
     """
     loc = item["loc"]
-    node, path = tree, ""
+    node, path, models = tree, "", [model]
     for k, key in enumerate(loc):
+        member = _is_member(models, key)
+        models = _inner(models, key)
+        if member:
+            continue
         if isinstance(key, int):
             if not isinstance(node, list | tuple) or key >= len(node):
                 continue
@@ -242,21 +266,30 @@ def _known_keys(model: type[BaseModel], loc: Sequence[str | int]) -> list[str]:
     """The keys of the table at ``loc`` inside the model."""
     models = [model]
     for key in loc:
-        if isinstance(key, int):
-            continue
-        fields = [
-            field
-            for one in models
-            for name, field in one.model_fields.items()
-            if key in (name, field.alias)
-        ]
-        if fields:
-            models = [inner for field in fields for inner in models_in(field.annotation)]
-        else:  # the name of a union's member
-            models = [one for one in models if key in (kind_of(one), one.__name__)] or models
+        models = _inner(models, key)
     return sorted(
         {field.alias or name for one in models for name, field in one.model_fields.items()}
     )
+
+
+def _is_member(models: Sequence[type[BaseModel]], key: str | int) -> bool:
+    """Whether a part of a location only names one of several kinds, as key or not."""
+    return len(models) > 1 and any(key == kind_of(one) for one in models)
+
+
+def _inner(models: list[type[BaseModel]], key: str | int) -> list[type[BaseModel]]:
+    """The models that the next part of a location leads to."""
+    if isinstance(key, int):
+        return models
+    if _is_member(models, key):
+        return [one for one in models if kind_of(one) == key]
+    fields = [
+        field
+        for one in models
+        for name, field in one.model_fields.items()
+        if key in (name, field.alias)
+    ]
+    return [inner for field in fields for inner in models_in(field.annotation)]
 
 
 def models_in(annotation: Any) -> list[type[BaseModel]]:

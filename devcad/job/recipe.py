@@ -40,7 +40,7 @@ def _known(names: list[str], known: Iterable[str], noun: str) -> list[str]:
             raise JobError(
                 f'this version knows no {noun} "{name[:60]}"',
                 value=name[:60],
-                limit=", ".join(known),
+                limit=", ".join(dict.fromkeys(known)),
                 remedy=did_you_mean(name, known),
             )
     return list(dict.fromkeys(names))
@@ -63,7 +63,7 @@ class StepTable(_Table):
 class DxfTable(_Table):
     """How cut patterns are written."""
 
-    version: Literal["R2000", "R2010"] | None = None
+    version: Literal["R12", "R2000", "R2010"] | None = None
     profile: Literal["generic"] | None = None
     curves: Literal["arcs", "polyline", "spline"] | None = None
 

@@ -18,12 +18,21 @@ _DEVICES = re.compile(r"(?:con|prn|aux|nul|com[0-9]|lpt[0-9])(?:\..*)?", re.IGNO
 
 def _file_name(value: str) -> str:
     """A name that every file system takes."""
-    if not NAME.fullmatch(value) or value.endswith(".") or _DEVICES.fullmatch(value):
+    why = remedy = ""
+    if _DEVICES.fullmatch(value):
+        why, remedy = ": it is a device of Windows", "choose another name"
+    elif value.endswith(".") and NAME.fullmatch(value):
+        why, remedy = ": Windows drops the dot at its end", "remove the dot"
+    elif not NAME.fullmatch(value):
+        remedy = (
+            "use up to 64 letters, digits, dots, dashes and underscores, a letter or digit first"
+        )
+    if remedy:
         raise JobError(
-            f'"{value[:70]}" cannot be a file name everywhere',
+            f'"{value[:70]}" cannot be a file name everywhere{why}',
             value=value[:70],
             limit=f"{NAME.pattern}, no trailing dot, no Windows device name",
-            remedy="use up to 64 letters, digits, dots, dashes and underscores",
+            remedy=remedy,
         )
     return value
 

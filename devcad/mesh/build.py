@@ -17,6 +17,7 @@ from devcad.geometry.taylor import Array, rows_cross
 from devcad.mesh.mesh import Mesh
 
 Index = NDArray[np.int32]
+Places = NDArray[np.intp]
 Flat = Callable[[int, Array, Array], Array]
 """patch number, t (n,), v (n,) -> the places in the pattern (n, 2)."""
 COLLAPSED = 1e-12
@@ -213,17 +214,7 @@ def _joined(strips: list[_Strip], *, watertight: bool, deviation: float) -> Mesh
         near_left, near_right = start + i, start + n + i
         far_left, far_right = near_left + 1, near_right + 1
         number = np.concatenate([s.id_left, s.id_right])
-        corners = (
-            np.concatenate(
-                [
-                    np.stack([near_left, near_right, far_right], axis=1),
-                    np.stack([near_left, far_right, far_left], axis=1),
-                ]
-            )
-            .reshape(2, n - 1, 3)
-            .swapaxes(0, 1)
-            .reshape(-1, 3)
-        )
+        corners = _divided(s, near_left, near_right, far_left, far_right)
         named = number[corners - start]
         real = (
             (named[:, 0] != named[:, 1])
@@ -246,6 +237,29 @@ def _joined(strips: list[_Strip], *, watertight: bool, deviation: float) -> Mesh
         watertight,
         deviation,
     )
+
+
+def _divided(
+    s: _Strip, near_left: Places, near_right: Places, far_left: Places, far_right: Places
+) -> Places:
+    """Two triangles of every quad, (2 (n - 1), 3), along the diagonal that folds nothing over.
+
+    Near a regression curve a quad is not convex: the diagonal must start at its inward corner.
+    The one from near left is taken unless the smaller of its triangles, seen from outside, is
+    smaller than the other diagonal's by a hundredth.
+    """
+    a, b, c, d = s.left[:-1], s.right[:-1], s.right[1:], s.left[1:]
+    normal = s.normal_left[:-1] + s.normal_left[1:]
+
+    def seen(x: Array, y: Array, z: Array) -> Array:
+        return np.asarray(np.einsum("ij,ij->i", rows_cross(y - x, z - x), normal))
+
+    first = np.minimum(seen(a, b, c), seen(a, c, d))
+    other = np.minimum(seen(a, b, d), seen(b, c, d))
+    crossed = (other - first > 0.01 * np.abs(other))[:, None, None]
+    plain = np.stack([near_left, near_right, far_right, near_left, far_right, far_left], axis=1)
+    turned = np.stack([near_left, near_right, far_left, near_right, far_right, far_left], axis=1)
+    return np.where(crossed, turned.reshape(-1, 2, 3), plain.reshape(-1, 2, 3)).reshape(-1, 3)
 
 
 def volume(mesh: Mesh) -> float:

@@ -16,7 +16,7 @@ Rows = dict[str, str]
 
 def _first_line(model: type[object]) -> str:
     """The first line of a model's docstring."""
-    return (model.__doc__ or "").strip().split("\n")[0]
+    return (model.__doc__ or "").strip().split("\n")[0].replace("``", "")
 
 
 def _surfaces() -> Rows:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import threading
+from collections.abc import Callable
 from types import TracebackType
 from typing import Any
 
@@ -13,13 +14,13 @@ PATIENCE = 1.0  # seconds of silence
 class ProgressLine:
     """Shows what is being done on stderr, if it is a terminal, once ``PATIENCE`` is over.
 
-    rich is loaded only then.
+    rich is loaded only then. ``timer`` calls its second argument after so many seconds.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, timer: Callable[..., threading.Timer] = threading.Timer) -> None:
         self._text = ""
         self._status: Any = None
-        self._timer = threading.Timer(PATIENCE, self._start)
+        self._timer = timer(PATIENCE, self._start)
 
     def __enter__(self) -> ProgressLine:
         if sys.stderr.isatty():

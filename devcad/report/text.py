@@ -8,7 +8,8 @@ from typing import Any
 
 
 def file_lines(report: dict[str, Any], out: str) -> Iterator[str]:
-    """A line a file: path, size, distance from the true shape."""
+    """A line a file: path, size, distance from the true shape; then the checks that failed but
+    were allowed to."""
     files = report["files"]
     paths = [str(Path(out, report["job"], file["path"])) for file in files]
     width = max((len(path) for path in paths), default=0)
@@ -16,6 +17,11 @@ def file_lines(report: dict[str, Any], out: str) -> Iterator[str]:
         deviation = file["max_deviation"]
         near = f"within {deviation:.2g} mm" if deviation else "exact"
         yield f"{path:{width}}  {file['bytes'] / 1000:9.1f} kB  {near}"
+    for item in report["checks"]:
+        if not item["passed"]:
+            value, limit = (_number(item[key]) for key in ("value", "limit"))
+            told = f"{item['name']} {value} {item['unit']}".rstrip()
+            yield f"allowed: panel {item['panel']}: {told}, limit {limit} {item['unit']}".rstrip()
 
 
 def check_lines(report: dict[str, Any]) -> Iterator[str]:

@@ -196,3 +196,9 @@ def test_fold_back_holds_where_the_bending_jumps():
     chain = Chain((Patch(field, (0.0, 3.0), (1.0,)),))
     worst, _ = fold_back(chain, develop_chain(chain))
     assert worst.value < 1e-13
+
+
+def test_a_base_curve_that_is_only_rounding_costs_nothing():
+    # the apex of a flat cone moved along a constant normal: p and q are rounding, not a function
+    cone = frustum(100.0, 0.0, 1e-12).parallel(0.7).restricted(0.0, 2.0)
+    assert develop(cone).series.samples <= 200

@@ -6,7 +6,8 @@ from patches import frustum, helix_tangent, prism, slanted_pipe, wall
 
 from devcad.errors import GeometryError, JobError
 from devcad.flatten.outline import surface_area
-from devcad.geometry.chain import cut_at, link, parallel_chain, with_gap
+from devcad.geometry.chain import cut_at, link, with_gap
+from devcad.geometry.parallel import parallel_chain
 
 SQUARE = np.array([[0, 0], [40, 0], [40, 30], [0, 30]], dtype=float)
 

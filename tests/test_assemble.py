@@ -1,0 +1,153 @@
+"""Whole panels at their edges: thick sheets described by a skin, apexes, mitres, huge parts."""
+
+import numpy as np
+import pytest
+
+import devcad
+from devcad.assemble import PanelSpec, assemble
+from devcad.errors import GeometryError, LimitError
+from devcad.geometry import taylor
+from devcad.geometry.patch import Patch, RulingJet
+from devcad.mesh.build import volume
+
+
+def built(folder, text):
+    job = folder / "job.toml"
+    job.write_text(f'name = "job"\n{text}')
+    return devcad.build(job).panels[0]
+
+
+def facing(mesh):
+    corner = mesh.vertices[mesh.triangles]
+    across = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    return np.einsum("ij,ij->i", across, mesh.normals[mesh.triangles[:, 0]])
+
+
+@pytest.mark.parametrize(("reference", "sign"), [("front", 1.0), ("back", -1.0)])
+def test_the_middle_of_a_frustum_described_by_a_skin_is_steiner_wider(tmp_path, reference, sign):
+    # area at distance d along n: A - d * (turning of n) * slant; front: d = -T / 2
+    panel = built(
+        tmp_path,
+        f'thickness = 3\nreference = "{reference}"\n[surface]\nkind = "frustum"\n'
+        "radius = 100\ntop_radius = 50\nheight = 120\n",
+    )
+    turning = 2 * np.pi * 120 / 130
+    expected = 61261.05674500097 + sign * 1.5 * turning * 130
+    assert panel.facts["area"] == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize("reference", ["front", "back", "middle"])
+@pytest.mark.parametrize("sweep", [360, 200])
+def test_a_pointed_cone_ends_in_its_own_apex_on_every_layer(tmp_path, reference, sweep):
+    panel = built(
+        tmp_path,
+        f'thickness = 2\nreference = "{reference}"\ntolerance = 0.001\n[surface]\n'
+        f'kind = "frustum"\nradius = 30\ntop_radius = 0\nheight = 40\nsweep = {sweep}\n',
+    )
+    assert panel.facts["apex"]
+    # between the coaxial cones of slant 50 shifted along the axis; the base wall is normal
+    share = sweep / 360
+    area = panel.facts["area"]
+    tip = 2.0**3 / 24 * (2 * np.pi * share) * 0.8**2 / 0.6
+    # the described skin ends at its own apex: its slant is 50, the middle's 50 -+ tan
+    lift = {"front": -1.0, "back": 1.0, "middle": 0.0}[reference]
+    slant = 50.0 - lift * 0.8 / 0.6
+    assert area == pytest.approx(0.5 * slant**2 * 2 * np.pi * share * 0.6, rel=1e-12)
+    assert volume(panel.mesh) == pytest.approx(2 * area + tip, abs=area * 0.001)
+
+
+def test_a_sharp_hopper_described_by_its_outside_has_mitred_middle_planes(tmp_path):
+    panel = built(
+        tmp_path,
+        'thickness = 2\nreference = "back"\n[surface]\nkind = "cone"\napex = [0, 0, -400]\n'
+        "extent = [0.25, 1]\n[surface.directrix]\n"
+        'kind = "polyline"\nclosed = true\n'
+        "points = [[200, -200, 0], [200, 200, 0], [-200, 200, 0], [-200, -200, 0]]\n",
+    )
+    apex = np.array([0.0, 0.0, -400.0])
+    middles = [patch.frame([0.5 * sum(patch.domain)]) for patch in panel.chain.patches]
+    heights = [abs(f.n[0] @ (f.c0[0] + f.v_from[0] * f.e[0] - apex)) for f in middles]
+    np.testing.assert_allclose(heights, 1.0, rtol=1e-12)  # every plane moved by T / 2
+    # neighbours still share their ruling, and the rulings' ends stay in two planes z = const
+    rims = [f.c0[0] + f.v_to[0] * f.e[0] for f in middles]
+    np.testing.assert_allclose([rim[2] for rim in rims], rims[0][2], rtol=1e-12)
+    assert (facing(panel.mesh) > 0.0).all()
+    error = abs(volume(panel.mesh) - 2 * panel.facts["area"])
+    assert error < 1e-9 * panel.facts["area"]  # planes: the mesh is exact
+
+
+def test_a_flat_fan_described_by_a_skin_is_a_trapezoid(tmp_path):
+    panel = built(
+        tmp_path,
+        'thickness = 3\nreference = "front"\n[surface]\nkind = "cone"\napex = [0, 0, -300]\n'
+        'extent = [0.4, 1]\ndirectrix = { kind = "line", from = [0, -100, 0], to = [70, -100, 0] }',
+    )
+    height = np.hypot(100, 300)
+    assert panel.facts["area"] == pytest.approx(0.5 * 70 * height * (1 - 0.4**2), rel=1e-12)
+
+
+@pytest.mark.parametrize("start", [0.0, 0.01, 0.3])
+def test_no_triangle_folds_over_beside_the_regression_curve(tmp_path, start):
+    panel = built(
+        tmp_path,
+        f'[surface]\nkind = "tangent"\nextent = [{start}, 30]\n'
+        'curve = { kind = "helix", radius = 15, pitch = 20, turns = 0.5 }\n',
+    )
+    assert (facing(panel.mesh) > 0.0).all()
+    corner = panel.mesh.flat[panel.mesh.triangles]
+    u, w = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
+    assert (u[:, 0] * w[:, 1] - u[:, 1] * w[:, 0] > 0.0).all()  # nor in the pattern
+
+
+@pytest.mark.parametrize("thickness", [15.0, 19.9])
+def test_a_very_thick_tube_keeps_its_volume_within_area_times_tolerance(tmp_path, thickness):
+    panel = built(
+        tmp_path,
+        f'thickness = {thickness}\n[surface]\nkind = "cylinder"\nradius = 10\nlength = 30\n',
+    )
+    area = 2 * np.pi * 10 * 30
+    assert abs(volume(panel.mesh) - area * thickness) <= area * 0.05
+
+
+def test_what_float32_rounds_off_a_large_part_is_left_out_of_its_tolerance(tmp_path):
+    panel = built(
+        tmp_path,
+        '[surface]\nkind = "frustum"\nradius = 9000\ntop_radius = 4000\nheight = 3000\nsweep = 40',
+    )
+    written = panel.mesh.vertices.astype(np.float32).astype(float)
+    moved = np.linalg.norm(written - panel.mesh.vertices, axis=1).max()
+    assert panel.mesh.deviation + moved <= 0.05
+
+
+def test_a_moebius_band_has_no_thickness_without_a_gap():
+    # the ruled band of a half turn: not developable, which is allowed here to reach the point
+    def field(t, order):
+        sin, cos = taylor.sin_cos(taylor.variable(t, order))
+        up, out = taylor.sin_cos(0.5 * taylor.variable(t, order))
+        e = np.stack([taylor.mul(out, cos), taylor.mul(out, sin), up], axis=-1)
+        circle = 50.0 * np.stack([cos, sin, 0.0 * cos], axis=-1)
+        v = taylor.constant(5.0, order, t.size)
+        return RulingJet(circle, e, -v, v)
+
+    spec = PanelSpec("band", "ruled", (Patch(field, (0.0, 2 * np.pi)),), True, 1.0, None, 0.0, None)
+
+    def assembled(thickness):
+        return assemble(
+            "band",
+            [spec],
+            thickness=thickness,
+            reference="middle",
+            tolerance=0.05,
+            bend=1.0,
+            allow=frozenset({"twist", "overlap"}),
+        )
+
+    facts = assembled(0.0).panels[0].facts
+    assert (facts["orientable"], facts["closed"]) == (False, False)
+    with pytest.raises(GeometryError, match="Moebius"):
+        assembled(1.0)
+
+
+def test_a_part_in_the_wrong_units_is_refused_before_it_fills_the_memory(tmp_path):
+    with pytest.raises(LimitError, match="rulings"):
+        built(tmp_path, '[surface]\nkind = "cylinder"\nradius = 1e10\nlength = 1e10\n')
