@@ -60,7 +60,12 @@ def _write(text: str) -> None:
         _close_stdout()
     except OSError as error:
         _close_stdout()
-        raise _broken(error, "stdout") from None
+        raise FileError(
+            f"cannot write: {error.strerror or error}",
+            place="stdout",
+            value=error.strerror,
+            remedy="make room where it leads",
+        ) from None
 
 
 def tell(error: DevcadError) -> None:
@@ -98,7 +103,7 @@ def failure(error: Exception) -> DevcadError:
     if isinstance(error, MemoryError):
         return LimitError("there is not enough memory", remedy="give a larger tolerance")
     if isinstance(error, OSError):
-        return _broken(error, str(error.filename or ""))
+        return _broken(error)
     return DevcadError(
         f"internal error: {type(error).__name__}: {error}",
         value=type(error).__name__,
@@ -106,12 +111,12 @@ def failure(error: Exception) -> DevcadError:
     )
 
 
-def _broken(error: OSError, place: str) -> FileError:
+def _broken(error: OSError) -> FileError:
     """What the system refused to read or write."""
     reason = error.strerror or str(error)
     return FileError(
-        f"cannot be read or written: {reason}" if place else f"cannot read or write: {reason}",
-        place=place,
+        f"cannot read or write: {reason}",
+        place=os.fsdecode(error.filename) if isinstance(error.filename, str | bytes) else "",
         value=reason,
         remedy="check the space on the disk and the permissions",
     )

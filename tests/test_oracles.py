@@ -8,6 +8,8 @@ import pytest
 
 import devcad
 from devcad.errors import CheckFailed, GeometryError
+from devcad.geometry.curves import CircleCurve, ExpressionCurve
+from devcad.geometry.frames import LORENTZ, ROWS, frenet
 
 
 def built(folder: Path, surface: str, name: str = "case"):
@@ -83,3 +85,49 @@ def test_the_type_and_the_pattern_do_not_depend_on_units(tmp_path):
         assert other["area"] == pytest.approx(facts[0]["area"], rel=1e-12)
         assert other["flat_bbox"] == pytest.approx(facts[0]["flat_bbox"], rel=1e-12, abs=1e-9)
         assert other["ruling_count"] == facts[0]["ruling_count"]
+
+
+def turning_rate(curve, theta0, row, t):
+    """|mu k| ds/dt and ds/dt at t (n,): how fast the Lorentzian unrolling turns."""
+    nodes, weights = np.polynomial.legendre.leggauss(40)
+    torsion = lambda s: (lambda d: d.torsion[0] * d.speed[0])(frenet(curve.jet(s, 3), LORENTZ))  # noqa: E731
+    start = curve.domain[0]
+    turned = [
+        0.5 * (x - start) * weights @ torsion(start + 0.5 * (x - start) * (nodes + 1)) for x in t
+    ]
+    data = frenet(curve.jet(t, 3), LORENTZ)
+    mu = ROWS[row].mu(theta0 - np.array(turned))
+    return mu * data.curvature[0] * data.speed[0], data.speed[0]
+
+
+def test_lorentzian_figures_of_the_spacelike_cone():
+    # O04: slant, sector angle and area of the Lorentzian unrolling
+    curve = CircleCurve(kind="circle", radius=2).curve()
+    rate, speed = turning_rate(curve, 1.0, "SB", np.array([0.5, 3.0]))
+    slant = speed / np.abs(rate)
+    angle = 2 * np.pi * np.abs(rate)
+    np.testing.assert_allclose(slant, 1.2961085473277707, rtol=1e-12)
+    np.testing.assert_allclose(angle, 9.695461572464488, rtol=1e-12)
+    np.testing.assert_allclose(0.5 * slant**2 * angle, 8.143690181079727, rtol=1e-12)
+
+
+def test_lorentzian_figures_of_the_spacelike_helix():
+    # O05: arc length 1.5, height 0.5; area density |1 + t mu k| and turning |mu k| per length
+    curve = ExpressionCurve(
+        kind="expression", x="2*cos(t)", y="2*sin(t)", z="t", t=(0, 1.5 / np.sqrt(3.0))
+    ).curve()
+    nodes, weights = np.polynomial.legendre.leggauss(40)
+    half = 0.5 * curve.domain[1]
+    rate, speed = turning_rate(curve, 0.5, "SB", half * (nodes + 1))
+    assert half * weights @ np.abs(rate) == pytest.approx(1.0421906109874948, rel=1e-11)
+    density = 0.5 * speed + 0.5**2 / 2 * rate  # 1 + t mu k > 0 throughout
+    assert half * weights @ density == pytest.approx(0.6197261736265631, rel=1e-11)
+
+
+def test_the_timelike_helix_is_singular_where_the_oracle_says(tmp_path):
+    # O08: t* = 1 / (k sin theta0), a Lorentz length along the unit ruling
+    (case,) = [o for o in oracles.ORACLES if o.name.startswith("O08")]
+    part = built(tmp_path, f'kind = "{case.kind}"\n{case.surface}')
+    frame = part.panels[0].chain.patches[0].frame([0.0])
+    lorentz = np.sqrt(abs(frame.e[0] @ (LORENTZ * frame.e[0])))
+    assert -frame.q[0] / frame.a[0] * lorentz == pytest.approx(15.100468643017033, rel=1e-11)

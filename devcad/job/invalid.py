@@ -283,6 +283,8 @@ def _inner(models: list[type[BaseModel]], key: str | int) -> list[type[BaseModel
         return models
     if _is_member(models, key):
         return [one for one in models if kind_of(one) == key]
+    for one in models:
+        one.model_rebuild()  # one that speaks of itself, as a chain of chains, is not yet complete
     fields = [
         field
         for one in models
