@@ -18,7 +18,7 @@ from devcad.facts import panel_facts
 from devcad.flatten.bend import bent
 from devcad.flatten.development import Development, develop_chain
 from devcad.flatten.outline import lay_out
-from devcad.geometry.chain import Chain, cut_at, link, with_gap
+from devcad.geometry.chain import SMOOTH, Chain, cut_at, link, with_gap
 from devcad.geometry.classify import Shape, classify, patch_box
 from devcad.geometry.layers import at_apex, straight_sided
 from devcad.geometry.parallel import parallel_chain
@@ -118,6 +118,12 @@ def _panel(
     middle = _middle(described, thickness, reference)
     if spec.gap:
         middle = with_gap(middle, spec.gap)
+    elif thickness and middle.closes is False and (middle.closing_angle or 0.0) <= SMOOTH:
+        raise GeometryError(
+            "the extent does not return to its start although the ruling does: the walls at both "
+            "ends of a sheet with thickness would lie in one another",
+            remedy="make the extent the same at both ends, or give the part no thickness",
+        )
     elif thickness and not middle.orientable:
         raise GeometryError(
             "a Moebius band closed without a gap has no inside for its thickness",

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from devcad import console
-from devcad.errors import DevcadError, JobError
+from devcad.errors import DevcadError, FileError, JobError
 from devcad.interrupts import Interrupts
 
 if TYPE_CHECKING:
@@ -44,22 +44,32 @@ def work_through(
     lines: Callable[[dict[str, Any]], Iterable[str]],
     interrupts: Interrupts,
 ) -> int:
-    """Load every job, then work on each; the exit code is the largest."""
+    """Load every job, then work on each; the exit code is the largest.
+
+    Raises:
+        FileError: stdout cannot be written; every job was worked on nevertheless.
+    """
     outcomes = [_loaded(path) for path in paths]
     interrupts.check()
     twins = _refuse_twins(outcomes)
+    unsaid: list[FileError] = []
     for outcome in outcomes:
         if outcome.job is not None and not outcome.errors and not twins:
             _work_on(outcome, outcome.job, work)
         interrupts.check()
-        for error in outcome.errors:
-            console.tell(error)
-        if outcome.report is not None and not as_json:
-            for line in lines(outcome.report):
-                console.say(line)
+        try:
+            for error in outcome.errors:
+                console.tell(error)
+            if outcome.report is not None and not as_json:
+                for line in lines(outcome.report):
+                    console.say(line)
+        except FileError as broken:
+            unsaid.append(broken)
     if as_json:
         done = [outcome.entry() for outcome in outcomes if outcome.report or outcome.errors]
         console.say_json(done)
+    if unsaid:
+        raise unsaid[0]
     return max(outcome.code for outcome in outcomes)
 
 

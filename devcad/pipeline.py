@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from devcad.assemble import PanelSpec, assemble
 from devcad.checks import require
-from devcad.errors import DevcadError
+from devcad.errors import DevcadError, FileError
 from devcad.export import Options, Written, writer
-from devcad.export.folder import published, unwritable
+from devcad.export.folder import REPORT, published, unwritable
 from devcad.job.load import Job, JobPanel, load
 from devcad.job.recipe import Recipe, known_checks, known_formats, resolve
 from devcad.part import Panel, Part
@@ -115,11 +116,14 @@ def export(
     chosen = known_formats(list(formats))
     was_allowed = {check.name for check in part.checks if not check.passed}
     allowed = frozenset(was_allowed.union(known_checks(list(allow))))
+    target = Path(out, part.name)
     with published(Path(out), part.name) as folder:
         written: list[Written] = []
         for name in chosen:
             progress(f"{part.name}: {name}")
-            written += _written(part, name, folder, options or Options(), Path(out))
+            write = writer(name)
+            with _naming(target, f"{part.name}.{name}"):
+                written += write(part, folder, options or Options())
         checks = [*part.checks, *(check for file in written for check in file.checks)]
         if MESHES.intersection(chosen):
             solids = (panel for panel in part.panels if panel.mesh.watertight)
@@ -127,20 +131,23 @@ def export(
         require(checks, allowed)
         origin = _svg_origin(part) if "svg" in chosen else None
         report = make_report(part, checks=checks, files=written, svg_origin=origin)
-        (folder / "report.json").write_bytes(to_bytes(report))
+        with _naming(target, REPORT):
+            (folder / REPORT).write_bytes(to_bytes(report))
     return report
 
 
-def _written(part: Part, name: str, folder: Path, options: Options, out: Path) -> list[Written]:
-    """The files of one format; a disk that is full is told with the file and the folder."""
-    write = writer(name)
+@contextmanager
+def _naming(target: Path, file: str) -> Iterator[None]:
+    """Tell what cannot be written with its file and the folder where it was to appear."""
     try:
-        return write(part, folder, options)
+        yield
+    except FileError as error:
+        error.place = str(target)
+        raise
     except DevcadError:
         raise
     except OSError as error:
-        file = "" if error.filename else f"{part.name}.{name}"
-        raise unwritable(out / part.name, error, file) from error
+        raise unwritable(target, error, "" if error.filename else file) from error
 
 
 def _placed(error: DevcadError, job: Job) -> DevcadError:

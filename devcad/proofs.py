@@ -222,7 +222,7 @@ def _tips(chain: Chain, thickness: float) -> float:
     for patch in chain.patches if thickness else ():
         frame = patch.frame(np.linspace(*patch.domain, 17)[1:-1])
         if at_apex(frame, frame.v_from) or at_apex(frame, frame.v_to):
-            total += thickness**3 / 24.0 * integral(patch, _tip_density)
+            total += thickness**3 / 24.0 * integral(patch, _tip_density, scale=1e-3)
     return total
 
 

@@ -151,3 +151,42 @@ def test_a_moebius_band_has_no_thickness_without_a_gap():
 def test_a_part_in_the_wrong_units_is_refused_before_it_fills_the_memory(tmp_path):
     with pytest.raises(LimitError, match="rulings"):
         built(tmp_path, '[surface]\nkind = "cylinder"\nradius = 1e10\nlength = 1e10\n')
+
+
+def test_a_middle_edge_square_to_an_aslant_cut_has_corners_where_the_bending_jumps(tmp_path):
+    # the front's edge is smooth; at a fillet's end the middle's edge turns, as n' jumps there
+    panel = built(
+        tmp_path,
+        'thickness = 10\nreference = "front"\n[surface]\nkind = "cylinder"\n'
+        "direction = [0.3, 0.2, 1]\nextent = [0, 200]\n[surface.directrix]\n"
+        'kind = "polyline"\npoints = [[0, 0, 0], [200, 0, 0], [200, 200, 0]]\ncorner_radius = 50\n',
+    )
+    tops = [edge for edge in panel.pattern.outline if edge.name == "top"]
+    assert len(tops) == 3  # line, arc, line
+    for edge in tops:
+        point, slope = edge.curve(np.linspace(*edge.u[[0, -1]], 5))
+        assert np.isfinite(point).all()
+        assert np.isfinite(slope).all()
+    report = devcad.export(
+        devcad.build(tmp_path / "job.toml"), tmp_path / "out", formats=["dxf", "svg"]
+    )
+    assert {check["name"]: check["passed"] for check in report["checks"]}["dxf-deviation"]
+
+
+def test_end_walls_that_would_lie_in_one_another_are_refused(tmp_path):
+    surface = (
+        '[surface]\nkind = "cylinder"\ndirection = [0, 0, 1]\nextent = [0, "50 + 10*t"]\n'
+        'directrix = { kind = "circle", radius = 40 }\n'
+    )
+    assert built(tmp_path, surface).facts["closes"] is False
+    with pytest.raises(GeometryError, match="does not return to its start"):
+        built(tmp_path, f"thickness = 1\n{surface}")
+
+
+def test_an_unbent_pointed_cone_with_thickness_is_built_at_once(tmp_path):
+    panel = built(
+        tmp_path,
+        'thickness = 2\nbend = 0\n[surface]\nkind = "frustum"\nradius = 54\ntop_radius = 0\n'
+        "height = 103\nsweep = 90\n",
+    )
+    assert volume(panel.mesh) == pytest.approx(2 * panel.facts["area"], abs=0.05 * 2 * 5000)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+import os
 import re
 import time
 from pathlib import Path
@@ -170,6 +171,17 @@ def test_a_folder_is_no_job(tmp_path: Path) -> None:
         load(tmp_path)
 
 
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="named pipes are POSIX")
+def test_a_pipe_is_no_job_and_no_table_and_is_not_waited_for(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(FileError, match="it is no regular file"):
+        load(tmp_path / "pipe")
+    with pytest.raises(FileError, match="it is no regular file"):
+        load(write(tmp_path, RAIL.format(rail='file = "pipe"')))
+    with pytest.raises(FileError, match="it is no regular file"):
+        load(os.devnull)
+
+
 def test_a_job_that_is_not_utf8_is_named_with_its_line(tmp_path: Path) -> None:
     (tmp_path / "job.toml").write_bytes(b'name = "lamp"\ndescription = "\xe4"\n')
     with pytest.raises(FileError, match="byte 0xe4 in line 2"):
@@ -196,7 +208,7 @@ ROWS = [f"{x!r}{{s}}{y!r}{{s}}{z!r}" for x, y, z in POINTS]
 
 
 @pytest.mark.parametrize("separator", [",", ";", " ; "])
-@pytest.mark.parametrize("header", ["", "x{s}y{s}z\n"])
+@pytest.mark.parametrize("header", ["", "x{s}y{s}z\n", "x1{s}-{s}z [mm]\n"])
 @pytest.mark.parametrize("end", ["\n", "\r\n", "\n\n"])
 def test_a_csv_file_gives_the_same_surface_as_its_points(
     separator: str, header: str, end: str, tmp_path: Path

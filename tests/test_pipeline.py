@@ -230,12 +230,54 @@ def test_a_folder_that_devcad_never_wrote_is_left_alone(lamp: Part, tmp_path: Pa
     foreign = tmp_path / "out" / "lamp"
     foreign.mkdir(parents=True)
     (foreign / "thesis.txt").write_text("ten years of work")
-    with pytest.raises(FileError, match=r'it is no export of devcad: it holds "thesis.txt"'):
+    with pytest.raises(FileError, match=r'it holds "thesis.txt", which no export put there'):
         devcad.export(lamp, tmp_path / "out", formats=LIGHT)
     assert snapshot(tmp_path) == {
         "job.toml": JOB.encode(),
         "out/lamp/thesis.txt": b"ten years of work",
     }
+
+
+@pytest.mark.parametrize("name", ["notes.txt", "lamp.notes", "sub/notes.txt"])
+def test_a_file_that_the_report_does_not_list_is_never_lost(
+    name: str, lamp: Part, tmp_path: Path
+) -> None:
+    out = tmp_path / "out"
+    devcad.export(lamp, out, formats=LIGHT)
+    (out / "lamp" / name).parent.mkdir(exist_ok=True)
+    (out / "lamp" / name).write_text("hi")
+    before = snapshot(tmp_path)
+    with pytest.raises(FileError, match=f'it holds "{name.split("/")[0]}"') as caught:
+        devcad.export(lamp, out, formats=LIGHT)
+    assert "move it elsewhere" in caught.value.remedy
+    assert snapshot(tmp_path) == before
+
+
+@pytest.mark.parametrize("report", ["", "{", "[]", '{"files": 1}', '{"files": [{}]}'])
+def test_a_report_that_is_none_of_ours_lists_nothing(
+    report: str, lamp: Part, tmp_path: Path
+) -> None:
+    foreign = tmp_path / "out" / "lamp"
+    foreign.mkdir(parents=True)
+    (foreign / "report.json").write_text(report)
+    with pytest.raises(FileError, match=r'it holds "report\.json"'):
+        devcad.export(lamp, tmp_path / "out", formats=LIGHT)
+    assert (foreign / "report.json").read_text() == report
+
+
+def test_what_a_file_manager_drops_into_a_folder_hinders_no_export(
+    lamp: Part, tmp_path: Path
+) -> None:
+    devcad.export(lamp, tmp_path / "out", formats=LIGHT)
+    (tmp_path / "out" / "lamp" / ".DS_Store").write_bytes(b"icons")
+    devcad.export(lamp, tmp_path / "out", formats=["svg"])
+    assert set(snapshot(tmp_path / "out")) == {"lamp/lamp.svg", "lamp/report.json"}
+
+
+def test_an_empty_folder_may_stand_where_the_export_goes(lamp: Part, tmp_path: Path) -> None:
+    (tmp_path / "out" / "lamp").mkdir(parents=True)
+    devcad.export(lamp, tmp_path / "out", formats=["svg"])
+    assert set(snapshot(tmp_path / "out")) == {"lamp/lamp.svg", "lamp/report.json"}
 
 
 def test_a_file_in_the_folders_place_is_left_alone(lamp: Part, tmp_path: Path) -> None:
@@ -248,7 +290,7 @@ def test_a_file_in_the_folders_place_is_left_alone(lamp: Part, tmp_path: Path) -
 
 def test_an_out_folder_that_cannot_be_made_is_a_matter_of_files(lamp: Part, tmp_path: Path) -> None:
     (tmp_path / "out").write_text("a file")
-    with pytest.raises(FileError, match="cannot write the folder"):
+    with pytest.raises(FileError, match="out is a file, not a folder"):
         devcad.export(lamp, tmp_path / "out" / "deeper", formats=LIGHT)
 
 
@@ -276,8 +318,10 @@ def test_where_folders_cannot_be_exchanged_two_renames_do_it(
 def _publish_many(out: Path, word: str, count: int) -> None:
     for _ in range(count):
         with published(out, "lamp") as staging:
-            for name in ("report.json", "lamp.a", "lamp.b"):
+            for name in ("lamp.a", "lamp.b"):
                 (staging / name).write_text(word)
+            files = [{"path": f"lamp.{k}", "word": word} for k in "ab"]
+            (staging / "report.json").write_text(json.dumps({"files": files}))
 
 
 def test_two_processes_never_mix_their_files(tmp_path: Path) -> None:
@@ -291,32 +335,97 @@ def test_two_processes_never_mix_their_files(tmp_path: Path) -> None:
     for worker in workers:
         worker.join()
     assert [worker.exitcode for worker in workers] == [0, 0]
-    assert len(set(snapshot(tmp_path).values())) == 1
+    written = snapshot(tmp_path / "lamp")
+    assert written["lamp.a"] == written["lamp.b"]
+    assert b'"word": "%s"' % written["lamp.a"] in written["report.json"]
     assert sorted(snapshot(tmp_path)) == ["lamp/lamp.a", "lamp/lamp.b", "lamp/report.json"]
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGTERM to catch")
-def test_a_terminated_export_cleans_up(tmp_path: Path) -> None:
-    """The signal comes while the files are being written."""
-    path = job(tmp_path)
-    out = tmp_path / "out"
-    code = (
-        "import sys, time; from devcad import pipeline, cli\n"
-        "real = pipeline.writer\n"
-        "def slow(name):\n"
-        "    print('writing', flush=True); time.sleep(30)\n"
-        "pipeline.writer = slow\n"
-        f"sys.exit(cli.run(['export', {str(path)!r}, '-o', {str(out)!r}, '--to', 'stl']))"
+posix = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such signals and locks")
+WAITING = """\
+import sys, time; from devcad import pipeline, cli
+def slow(name):
+    print('writing', flush=True)
+    try:
+        time.sleep(30)
+    except BaseException as error:
+        if {hidden}:
+            raise ImportError('initialization failed') from None
+        raise
+pipeline.writer = slow
+sys.exit(cli.run(['export', {path!r}, '-o', {out!r}, '--to', 'stl']))
+"""
+
+
+def waiting(path: Path, out: Path, hidden: bool = False) -> subprocess.Popen[str]:
+    """An export in its own process that has begun to write and stays there."""
+    code = WAITING.format(path=str(path), out=str(out), hidden=hidden)
+    command = [sys.executable, "-c", code]
+    process = subprocess.Popen(
+        command, cwd=REPOSITORY, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )
-    with subprocess.Popen(
-        [sys.executable, "-c", code], cwd=REPOSITORY, stdout=subprocess.PIPE, text=True
-    ) as process:
-        assert process.stdout is not None
-        assert process.stdout.readline() == "writing\n"
-        assert any(entry.name.startswith(".lamp-") for entry in out.iterdir())
-        process.send_signal(signal.SIGTERM)
-        assert process.wait(timeout=20) == 128 + signal.SIGTERM
+    assert process.stdout is not None
+    assert process.stdout.readline() == "writing\n"
+    return process
+
+
+def staged(out: Path) -> list[str]:
+    return [entry.name for entry in out.iterdir() if entry.name.startswith(".lamp-")]
+
+
+@posix
+@pytest.mark.parametrize("hidden", [False, True], ids=["plain", "as-import-error"])
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
+def test_a_signal_ends_an_export_quietly_and_leaves_no_files(
+    name: str, hidden: bool, tmp_path: Path
+) -> None:
+    """The signal comes while the files are being written; a compiled library that is being
+    imported then turns what it raises into its own ImportError."""
+    number = getattr(signal, name)
+    out = tmp_path / "out"
+    with waiting(job(tmp_path), out, hidden) as process:
+        assert len(staged(out)) == 1
+        process.send_signal(number)
+        assert process.communicate(timeout=20) == ("", "")
+    assert process.returncode == 128 + number
     assert not out.exists()
+
+
+@posix
+def test_an_ignored_hangup_stays_ignored(tmp_path: Path) -> None:
+    """As under nohup."""
+    words = ["export", str(job(tmp_path)), "-o", str(tmp_path), "--to", "svg"]
+    code = (
+        "import os, signal, sys; signal.signal(signal.SIGHUP, signal.SIG_IGN)\n"
+        "from devcad import pipeline, cli; real = pipeline.writer\n"
+        "def writer(name):\n"
+        "    os.kill(os.getpid(), signal.SIGHUP); return real(name)\n"
+        "pipeline.writer = writer\n"
+        f"sys.exit(cli.run({words!r}))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], cwd=REPOSITORY, capture_output=True)
+    assert (done.returncode, done.stderr) == (0, b"")
+    assert (tmp_path / "lamp" / "lamp.svg").is_file()
+
+
+@posix
+def test_an_export_sweeps_what_a_killed_one_left_but_not_what_another_is_writing(
+    lamp: Part, tmp_path: Path
+) -> None:
+    path, out = job(tmp_path), tmp_path / "out"
+    with waiting(path, out) as killed:
+        killed.kill()
+    (left,) = staged(out)
+    foreign = out / ".lamp-2-0123456789abcdef.part"  # another job's
+    foreign.mkdir()
+    with waiting(path, out) as living:
+        (live,) = (name for name in staged(out) if name != foreign.name)
+        assert live != left
+        devcad.export(lamp, out, formats=["svg"])
+        assert set(staged(out)) == {live, foreign.name}
+        assert (out / "lamp" / "lamp.svg").is_file()
+        living.terminate()
+    assert staged(out) == [foreign.name]
 
 
 # --- checks and recipes --------------------------------------------------------------------
@@ -381,6 +490,15 @@ def test_the_nearer_word_wins() -> None:
     assert resolve("paper", table()).formats == ("svg", "dxf")
     assert resolve(None, table()).formats == ("step", "stl", "glb", "dxf", "svg")
     assert resolve(None, table()).options == Options()
+
+
+def test_a_recipe_may_ask_for_the_oldest_dxf(tmp_path: Path) -> None:
+    """R12 has no units: the name says them."""
+    path = job(tmp_path, JOB.replace("[surface]", '[recipe.dxf]\nversion = "R12"\n[surface]'))
+    recipe = pipeline.plan(devcad.load(path), formats=["dxf"])
+    report = devcad.export(devcad.build(path), tmp_path, formats=["dxf"], options=recipe.options)
+    assert [entry["path"] for entry in report["files"]] == ["lamp-mm.dxf"]
+    assert "AC1009" in (tmp_path / "lamp" / "lamp-mm.dxf").read_text()  # the version's own name
 
 
 @pytest.mark.parametrize("name", ["cad", "sheet-metal", "paper"])

@@ -6,9 +6,10 @@ import itertools
 from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import NDArray
 
 from devcad.flatten.development import Development
-from devcad.flatten.pattern import Edge, Line, Pattern
+from devcad.flatten.pattern import Edge, Line, Pattern, PlaneCurve
 from devcad.geometry import chebyshev
 from devcad.geometry.chain import Chain
 from devcad.geometry.patch import Frame, Patch
@@ -18,6 +19,8 @@ PlaneDensity = Callable[[Array, Array], Array]
 """Points (n, 2) and derivatives (n, 2) -> densities (n,)."""
 COLLAPSED = 1e-12
 """An edge shorter than this share of the pattern is a point: an apex."""
+KINK = 1e-6
+"""An edge that turns by more than this at one point, in radians, has a corner there."""
 LINE_EVERY = np.radians(15.0)
 """A reference ruling is drawn after this much bending: none on a plane."""
 TURN_STEPS = 8
@@ -38,9 +41,9 @@ def lay_out(
     first, last = pairs[0], pairs[-1]
     edges = [
         _ruling_edge("start", *first, first[0].domain[0], upwards=True),
-        *(_rail_edge("top", *pair) for pair in pairs),
+        *(edge for pair in pairs for edge in _rail_edges("top", *pair)),
         _ruling_edge("end", *last, last[0].domain[1], upwards=False),
-        *(_rail_edge("base", *pair) for pair in reversed(pairs)),
+        *(edge for pair in reversed(pairs) for edge in _rail_edges("base", *pair)),
     ]
     corners = np.concatenate([e.curve(e.u)[0] for e in edges])
     size = float(np.linalg.norm(np.ptp(corners, axis=0)))
@@ -55,9 +58,16 @@ def surface_area(patch: Patch) -> float:
     return integral(patch, _area_density)
 
 
-def integral(patch: Patch, density: Callable[[Frame], Array]) -> float:
-    """The integral over t of a density (n,) made from the frame, to rounding."""
-    series = chebyshev.resolve(lambda t: density(patch.frame(t))[:, None], patch.segments)
+def integral(patch: Patch, density: Callable[[Frame], Array], *, scale: float = 0.0) -> float:
+    """The integral over t of a density (n,) made from the frame, to rounding.
+
+    A total below ``scale`` is nothing: a density that is only rounding has no shape to resolve.
+    """
+    series = chebyshev.resolve(
+        lambda t: density(patch.frame(t))[:, None],
+        patch.segments,
+        scale=scale / (patch.domain[1] - patch.domain[0]),
+    )
     return float(series.antiderivative()(np.array(patch.domain))[1, 0])
 
 
@@ -96,8 +106,12 @@ def _integral(edge: Edge, density: PlaneDensity) -> float:
     return value if edge.u[-1] > edge.u[0] else -value
 
 
-def _rail_edge(name: str, patch: Patch, development: Development) -> Edge:
-    """The image of the extent's end: t increases along the top and decreases along the base."""
+def _rail_edges(name: str, patch: Patch, development: Development) -> list[Edge]:
+    """The image of the extent's end: t increases along the top and decreases along the base.
+
+    In pieces where it has a corner: the edge of a thick sheet's middle, which stands square to
+    a skin that was cut aslant, has one wherever the bending jumps.
+    """
     top = name == "top"
 
     def curve(t: Array) -> tuple[Array, Array]:
@@ -109,7 +123,31 @@ def _rail_edge(name: str, patch: Patch, development: Development) -> Edge:
         tangent = (f.p + slope)[:, None] * e + (f.q + v * f.a)[:, None] * m
         return development.points(t, v), tangent
 
-    return Edge(name, curve, patch.segments if top else patch.segments[::-1].copy())
+    knots = patch.segments
+    inner = knots[1:-1]
+    reach = 1e-9 * (knots[-1] - knots[0])  # a smooth edge turns by as little over this
+    before, after = (_heading(curve(inner + side * reach)[1]) for side in (-1.0, 1.0))
+    kinks = np.flatnonzero(np.abs(np.angle(after / before)) > KINK) + 1
+    pieces = np.split(knots, kinks)
+    runs = [
+        np.append(piece, following[:1])
+        for piece, following in itertools.zip_longest(pieces, pieces[1:], fillvalue=knots[:0])
+    ]
+    edges = [Edge(name, _kept_inside(curve, run), run if top else run[::-1].copy()) for run in runs]
+    return edges if top else edges[::-1]
+
+
+def _heading(slopes: Array) -> NDArray[np.complex128]:
+    """Plane directions as unit complex numbers; 1 where there is none."""
+    z = slopes[:, 0] + 1j * slopes[:, 1]
+    size = np.abs(z)
+    return np.divide(z, size, out=np.ones_like(z), where=size > 0.0)
+
+
+def _kept_inside(curve: PlaneCurve, run: Array) -> PlaneCurve:
+    """The curve, asked just inside the ends of a run: there it answers for this side."""
+    low, high = np.nextafter(run[0], run[-1]), np.nextafter(run[-1], run[0])
+    return lambda t: curve(np.clip(t, low, high))
 
 
 def _ruling_edge(

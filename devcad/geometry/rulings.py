@@ -30,6 +30,8 @@ USED = 0.998
 """Share of the tolerance that placement aims at; the rest covers sampling between points."""
 INNER = np.arange(1, 12) / 12
 """Where a strip's deviation is measured, in shares of its parameter."""
+MANY, SPENT = 16, 0.86
+"""A patch of this many strips is to use this share of its tolerance."""
 GRID = 129
 """Density samples on one smooth segment."""
 
@@ -47,16 +49,23 @@ def place(patch: Patch, layers: tuple[float, ...], tolerance: float) -> Placemen
 
     ``layers`` are the distances along n of the surfaces to be meshed. Rulings break where the
     surface's curvature jumps; at smoother breaks they need not. At most 30 degrees of turning
-    lie in one strip. Source: algorithms.md, 3.
+    lie in one strip. Strips of a segment are equal in their distance to the surface; only where
+    breaks leave a patch of 16 strips far below its tolerance, one segment is filled from its
+    start, so that the tolerance is what the mesh really has. Source: algorithms.md, 3.
 
     Raises:
         LimitError: more rulings than a part can have.
     """
     ends = _segments(patch, layers)
-    pieces = [
-        _place_segment(patch, layers, low, high, tolerance)
-        for low, high in itertools.pairwise(ends)
+    segments = [
+        _Segment(patch, layers, low, high, tolerance) for low, high in itertools.pairwise(ends)
     ]
+    pieces = [segment.fewest() for segment in segments]
+    if sum(len(piece.t) - 1 for piece in pieces) >= MANY:
+        worst = max(piece.deviation for piece in pieces)
+        most = max(range(len(pieces)), key=lambda k: len(pieces[k].t))
+        if worst < SPENT * tolerance and len(pieces[most].t) > 2:
+            pieces[most] = segments[most].spent(len(pieces[most].t) - 1)
     t = np.concatenate([*(piece.t[:-1] for piece in pieces), ends[-1:]])
     return Placement(t, max(piece.deviation for piece in pieces))
 
@@ -117,58 +126,71 @@ def _density(patch: Patch, layers: tuple[float, ...], t: Array, tolerance: float
     return np.asarray(np.maximum(density, np.hypot(jet.a[0], jet.c[0]) / TURN))
 
 
-def _place_segment(
-    patch: Patch, layers: tuple[float, ...], low: float, high: float, tolerance: float
-) -> Placement:
-    """Rulings on one segment: the smallest number that keeps the tolerance."""
-    grid = np.linspace(low, high, GRID)
-    inside = 0.5 * (grid[1:] + grid[:-1])
-    weight = np.maximum(_density(patch, layers, inside, tolerance), 0.0) * np.diff(grid)
-    # a floor keeps the parameters increasing where nothing bends
-    total = weight.sum()
-    weight = weight + 1e-6 * max(total, 1e-12) / GRID
-    cumulative = np.concatenate([[0.0], np.cumsum(weight)])
-    fewest = max(1, int(np.ceil(_turning(patch, low, high) / TURN - 1e-9)))
+class _Segment:
+    """One segment between forced rulings, and how rulings can be laid on it."""
 
-    def at(number: int) -> Placement:
-        t = np.interp(np.linspace(0.0, cumulative[-1], number + 1), cumulative, grid)
-        t[0], t[-1] = low, high
-        return Placement(t, float(strip_deviation(patch, layers, t).max()))
+    def __init__(
+        self, patch: Patch, layers: tuple[float, ...], low: float, high: float, tolerance: float
+    ) -> None:
+        self.patch, self.layers, self.aim = patch, layers, USED * tolerance
+        self.grid = np.linspace(low, high, GRID)
+        inside = 0.5 * (self.grid[1:] + self.grid[:-1])
+        step = np.diff(self.grid)
+        weight = np.maximum(_density(patch, layers, inside, tolerance), 0.0) * step
+        self.total = float(weight.sum())
+        # a floor keeps the parameters increasing where nothing bends
+        weight = weight + 1e-6 * max(self.total, 1e-12) / GRID
+        self.density = np.concatenate([[0.0], np.cumsum(weight)])
+        frame = patch.frame(inside)
+        turning = np.hypot(frame.a, frame.c) * step
+        self.turned = np.concatenate([[0.0], np.cumsum(turning)])
+        if self.total > MOST:
+            raise LimitError(
+                f"the tolerance of {tolerance:.6g} mm asks for {self.total:.6g} rulings, "
+                f"limit {MOST}",
+                value=self.total,
+                limit=float(MOST),
+                remedy="raise the tolerance; is the part in the right units?",
+            )
 
-    if max(fewest, total) > MOST:
-        raise LimitError(
-            f"the tolerance of {tolerance:.6g} mm asks for {max(fewest, total):.6g} rulings, "
-            f"limit {MOST}",
-            value=float(max(fewest, total)),
-            limit=float(MOST),
-            remedy="raise the tolerance; is the part in the right units?",
-        )
-    number = max(fewest, int(np.ceil(total - 1e-9)))
-    best: Placement | None = None
-    floor = fewest
-    for _ in range(24):
-        trial = at(number)
-        if trial.deviation <= USED * tolerance:
-            best = trial
-            guess = int(np.ceil(number * np.sqrt(trial.deviation / (USED * tolerance))))
-            following = max(floor, min(number - 1, guess))
-        else:
-            floor = number + 1
-            ratio = np.sqrt(trial.deviation / (USED * tolerance))
-            following = max(floor, int(np.ceil(number * min(ratio, 4.0))))
-            if best is not None:
-                following = min(following, len(best.t) - 2)
-        if following < floor or (best is not None and following >= len(best.t) - 1):
-            break
-        number = following
-    return best if best is not None else trial
+    def laid(self, number: float) -> tuple[Placement, float]:
+        """Strips of equal density, ``number`` of them (a fraction makes the last one smaller),
+        and by what factor their number is too small for the tolerance and the turning."""
+        share = np.append(np.arange(np.ceil(number - 1e-9)) / number, 1.0)
+        t = np.interp(share * self.density[-1], self.density, self.grid)
+        t[0], t[-1] = self.grid[0], self.grid[-1]
+        placed = Placement(t, float(strip_deviation(self.patch, self.layers, t).max()))
+        turn = float(np.diff(np.interp(t, self.grid, self.turned)).max())
+        # twelve strips of 30 degrees go round, whatever the rounding of their sum
+        return placed, max(np.sqrt(placed.deviation / self.aim), turn / TURN * (1.0 - 1e-9))
 
+    def fewest(self) -> Placement:
+        """The smallest number of equal strips that keeps the tolerance and the turning."""
+        number = max(1, int(np.ceil(self.total - 1e-9)))
+        best: Placement | None = None
+        floor = 1
+        for _ in range(24):
+            trial, short = self.laid(number)
+            if short <= 1.0:
+                best = trial
+                following = max(floor, min(number - 1, int(np.ceil(number * short))))
+            else:
+                floor = number + 1
+                following = max(floor, int(np.ceil(number * min(short, 4.0))))
+                if best is not None:
+                    following = min(following, len(best.t) - 2)
+            if following < floor or (best is not None and following >= len(best.t) - 1):
+                break
+            number = following
+        return best if best is not None else trial
 
-def _turning(patch: Patch, low: float, high: float) -> float:
-    """The turning of the frame over a segment in radians."""
-    t = low + (high - low) * (np.arange(64) + 0.5) / 64
-    frame = patch.frame(t)
-    return float(np.hypot(frame.a, frame.c).mean() * (high - low))
+    def spent(self, number: int) -> Placement:
+        """As many strips, all but the last as large as the tolerance and the turning allow."""
+        low, high = number - 1.0, float(number)
+        for _ in range(24):
+            middle = 0.5 * (low + high)
+            low, high = (low, middle) if self.laid(middle)[1] <= 1.0 else (middle, high)
+        return self.laid(high)[0]
 
 
 def _segments(patch: Patch, layers: tuple[float, ...]) -> Array:

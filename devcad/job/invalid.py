@@ -52,14 +52,19 @@ def problems(
 
 
 def _once(items: Sequence[Mapping[str, Any]], model: type[BaseModel]) -> list[Mapping[str, Any]]:
-    """The findings without the keys that are missing because they are mistyped."""
+    """The findings without the keys that are missing because they are mistyped, and without the
+    arrays that are too short because their entries are wrong."""
     meant: set[tuple[str | int, ...]] = set()
     for item in items:
         if item["type"] == "extra_forbidden":
             *table, key = item["loc"]
             nearest = _nearest(str(key), _known_keys(model, table))
             meant.update((*table, name) for name in nearest)
-    return [item for item in items if item["type"] != "missing" or item["loc"] not in meant]
+        elif item["type"] == "too_short":
+            within = (other["loc"][: len(item["loc"])] for other in items if other is not item)
+            meant.update([item["loc"]] if item["loc"] in within else [])
+    once = {"missing", "too_short"}
+    return [item for item in items if item["type"] not in once or item["loc"] not in meant]
 
 
 def below(place: str, path: str) -> str:

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from patches import ellipse_cylinder, frustum, helix_tangent, slanted_pipe
 
+import devcad
 from devcad.geometry.rulings import place
 
 PARTS = {
@@ -100,3 +101,17 @@ def test_scaling_part_and_tolerance_together_changes_no_parameter(scale):
     one = place(frustum(), (0.0,), 0.05)
     other = place(frustum().scaled(scale), (0.0,), 0.05 * scale)
     np.testing.assert_allclose(other.t, one.t, atol=1e-9)
+
+
+def test_breaks_do_not_leave_a_patch_of_many_strips_below_its_tolerance(tmp_path):
+    # three fillets that would each need a fraction more than a whole number of strips
+    job = tmp_path / "job.toml"
+    job.write_text(
+        'name = "job"\ntolerance = 0.2\n[surface]\nkind = "cylinder"\nlength = 50\n'
+        'direction = [0, 0, 1]\n[surface.directrix]\nkind = "polyline"\nclosed = true\n'
+        "corner_radius = 40\npoints = [[0, 0, 0], [400, 0, 0], [200, 300, 0]]\n"
+    )
+    (panel,) = devcad.build(job).panels
+    (t,) = panel.rulings
+    assert len(t) - 1 >= 16
+    assert 0.85 * 0.2 <= panel.mesh.deviation <= 0.2
