@@ -190,3 +190,16 @@ def test_an_unbent_pointed_cone_with_thickness_is_built_at_once(tmp_path):
         "height = 103\nsweep = 90\n",
     )
     assert volume(panel.mesh) == pytest.approx(2 * panel.facts["area"], abs=0.05 * 2 * 5000)
+
+
+def test_a_pipe_with_a_wavy_end_reaches_step(tmp_path):
+    job = tmp_path / "job.toml"
+    job.write_text(
+        'name = "job"\nthickness = 1\n[surface]\nkind = "cylinder"\nradius = 40\n'
+        'extent = [0, "60 + 5*sin(40*t)"]\n'
+    )
+    part = devcad.build(job)
+    assert part.panels[0].facts["area"] == pytest.approx(2 * np.pi * 40 * 60, rel=1e-12)
+    report = devcad.export(part, tmp_path / "out", formats=["step"])
+    deviation = {check["name"]: check["value"] for check in report["checks"]}["step-deviation"]
+    assert deviation <= 1e-4

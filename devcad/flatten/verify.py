@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 
 from devcad.flatten.development import Development
 from devcad.flatten.fold import fold_chain
-from devcad.flatten.pattern import Edge, Pattern, sample
+from devcad.flatten.pattern import Edge, Pattern
+from devcad.flatten.trace import trace
 from devcad.geometry.chain import Chain
 from devcad.geometry.patch import Patch
 from devcad.geometry.regularity import Extreme
@@ -15,6 +16,8 @@ from devcad.geometry.taylor import Array, rows_dot
 
 STENCIL = np.array([1 / 280, -4 / 105, 1 / 5, -4 / 5, 0.0, 4 / 5, -1 / 5, 4 / 105, -1 / 280])
 """Central difference of order 8, weights at -4 .. 4 steps."""
+TRACED = 1e-5
+"""Share of the pattern's size to which its outline is traced in the search for overlaps."""
 STEPS_PER_PANEL = 800.0
 """A step of the stencil is this share of a panel: 129 nodes resolve nothing that is finer."""
 
@@ -76,13 +79,14 @@ def fold_back(chain: Chain, developments: tuple[Development, ...]) -> tuple[Extr
     return worst, size
 
 
-def overlap_area(pattern: Pattern, per_piece: int = 96) -> float:
+def overlap_area(pattern: Pattern) -> float:
     """The area in mm2 that the pattern covers more than once, 0.0 when its outline is simple.
 
     A disc laid in the plane without folding overlaps itself only if its boundary crosses
     itself; the outline is looked at as a polygon, and only a true crossing costs the areas.
     """
-    polygon = np.concatenate([_run(edge, per_piece)[:-1] for edge in pattern.outline])
+    size = float(np.hypot(*np.subtract(pattern.bbox[2:], pattern.bbox[:2])))
+    polygon = np.concatenate([_run(edge, size)[:-1] for edge in pattern.outline])
     if not _crosses(polygon):
         return 0.0
     return _crossing_area(polygon)
@@ -120,9 +124,13 @@ def _slope(development: Development, t: Array, v: Array, step: Array) -> Array:
     return total / step[:, None]
 
 
-def _run(edge: Edge, per_piece: int) -> Array:
-    straight = edge.name in ("start", "end")
-    return sample(edge, 1 if straight else max(2, per_piece // max(1, len(edge.u) // 8)))
+def _run(edge: Edge, size: float) -> Array:
+    """An edge as a polygon: traced, so that no wave is missed, and eight steps between."""
+    if edge.name in ("start", "end"):
+        return edge.curve(edge.u)[0]
+    u = trace(edge, TRACED * size).u
+    between = u[:-1, None] + np.diff(u)[:, None] * (np.arange(8) / 8.0)
+    return edge.curve(np.append(between.ravel(), u[-1]))[0]
 
 
 def _crosses(polygon: Array) -> bool:

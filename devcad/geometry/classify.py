@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
+from itertools import pairwise
 
 import numpy as np
 
@@ -40,7 +42,7 @@ EXACT = 1e-9
 def classify(patch: Patch) -> Shape:
     """What the patch is, decided by how far its points would have to move, with the numbers.
 
-    Sampled at the ends, breaks and 32 parameters of every smooth segment. The plane is tried
+    Sampled at 33 parameters of every panel, its ends included. The plane is tried
     first, then the cylinder, then the cone; what is none of them is a tangent surface.
     Source: geometry.md, 0.3; axis and radius from the frame: the frame turns about a n + c e.
     """
@@ -54,13 +56,28 @@ def classify(patch: Patch) -> Shape:
     )
 
 
-def sample_parameters(patch: Patch, per_segment: int) -> Array:
-    """Parameters strictly inside every smooth segment and next to its ends, increasing."""
+@lru_cache(maxsize=32)  # every check of a patch asks anew
+def panels(patch: Patch) -> tuple[float, ...]:
+    """Parameters, breaks among them, between which polynomials resolve the patch's rails.
+
+    A base curve or an extent that waves many times between two breaks has as many panels more:
+    samples taken on each panel miss none of its waves.
+    """
+
+    def rails(t: Array) -> Array:
+        jet = patch.jet(t, 0)
+        return np.column_stack([jet.rail(jet.v_from)[0], jet.rail(jet.v_to)[0]])
+
+    ends = rails(np.linspace(*patch.domain, 9)[1:-1])
+    size = float(np.abs(ends - ends.mean(axis=0)).max())
+    # a millionth of the size is enough to see a wave
+    return tuple(chebyshev.resolve(rails, patch.segments, scale=1e8 * size).knots.tolist())
+
+
+def sample_parameters(patch: Patch, per_panel: int) -> Array:
+    """Parameters strictly inside every panel of the patch and next to its ends, increasing."""
     return np.concatenate(
-        [
-            chebyshev.nodes(low, high, per_segment)
-            for low, high in zip(patch.segments[:-1], patch.segments[1:], strict=True)
-        ]
+        [chebyshev.nodes(low, high, per_panel) for low, high in pairwise(panels(patch))]
     )
 
 

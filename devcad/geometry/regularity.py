@@ -21,8 +21,8 @@ INSIDE = 1e-3
 """Where P_t x e vanishes at an end, the twist is read at this share of the extent inside."""
 STRAIGHT = 1e-14
 """A ruling that turns by less than this share of the width across it does not turn."""
-PER_SEGMENT = 65
-"""Samples of a smooth segment in the search for a worst place."""
+PER_PANEL = 65
+"""Samples of a panel in the search for a worst place."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,7 +133,7 @@ def clearance(patch: Patch, layers: tuple[float, ...], *, to_apex: bool = False)
 
 def _turnover(patch: Patch) -> float | None:
     """A parameter where the normal turns faster than the patch bends: the front turns over."""
-    t = sample_parameters(patch, PER_SEGMENT)
+    t = sample_parameters(patch, PER_PANEL)
     frame = patch.frame(t)
     step = np.diff(t)
     bending = 0.5 * (np.abs(frame.c[1:]) + np.abs(frame.c[:-1])) * step
@@ -194,7 +194,7 @@ def singularities(patch: Patch, shape: Shape) -> tuple[Singularity, ...]:
         return (Singularity(patch.domain[0], shape.point, "apex"),)
     if shape.type != "tangent":
         return ()
-    t = sample_parameters(patch, PER_SEGMENT)
+    t = sample_parameters(patch, PER_PANEL)
     found = [_nearest_edge_point(patch, t)]
     for kind, function in (("swallowtail", _swallow), ("cuspidal-crosscap", _crosscap)):
         for root in _roots(patch, t, function):
@@ -207,10 +207,10 @@ def singularities(patch: Patch, shape: Shape) -> tuple[Singularity, ...]:
 def largest(patch: Patch, function: Callable[[Array], Array]) -> tuple[float, float]:
     """The largest value of a function of t over the patch, and where.
 
-    Sampled at 65 points of every smooth segment, then refined around the best one: the true
-    maximum of anything that has no finer structure than that.
+    Sampled at 65 points of every panel, then refined around the best one: the true maximum of
+    anything that has no finer structure than the rails.
     """
-    t = sample_parameters(patch, PER_SEGMENT)
+    t = sample_parameters(patch, PER_PANEL)
     values = function(t)
     value, place = -np.inf, float(t[0])
     for _ in range(6):

@@ -19,6 +19,7 @@ import numpy as np
 
 from devcad.errors import LimitError
 from devcad.geometry import taylor
+from devcad.geometry.classify import panels
 from devcad.geometry.patch import Patch
 from devcad.geometry.taylor import Array
 
@@ -33,7 +34,7 @@ INNER = np.arange(1, 12) / 12
 MANY, SPENT = 16, 0.86
 """A patch of this many strips is to use this share of its tolerance."""
 GRID = 129
-"""Density samples on one smooth segment."""
+"""Density samples on one panel of the patch."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,25 +134,30 @@ class _Segment:
         self, patch: Patch, layers: tuple[float, ...], low: float, high: float, tolerance: float
     ) -> None:
         self.patch, self.layers, self.aim = patch, layers, USED * tolerance
-        self.grid = np.linspace(low, high, GRID)
+        inner = [x for x in panels(patch) if low < x < high]
+        pieces = itertools.pairwise([low, *inner, high])
+        self.grid = np.unique(np.concatenate([np.linspace(a, b, GRID) for a, b in pieces]))
         inside = 0.5 * (self.grid[1:] + self.grid[:-1])
         step = np.diff(self.grid)
         weight = np.maximum(_density(patch, layers, inside, tolerance), 0.0) * step
         self.total = float(weight.sum())
         # a floor keeps the parameters increasing where nothing bends
-        weight = weight + 1e-6 * max(self.total, 1e-12) / GRID
+        weight = weight + 1e-6 * max(self.total, 1e-12) / len(weight)
         self.density = np.concatenate([[0.0], np.cumsum(weight)])
         frame = patch.frame(inside)
         turning = np.hypot(frame.a, frame.c) * step
         self.turned = np.concatenate([[0.0], np.cumsum(turning)])
         if self.total > MOST:
-            raise LimitError(
-                f"the tolerance of {tolerance:.6g} mm asks for {self.total:.6g} rulings, "
-                f"limit {MOST}",
-                value=self.total,
-                limit=float(MOST),
-                remedy="raise the tolerance; is the part in the right units?",
-            )
+            raise self._too_many(self.total)
+
+    def _too_many(self, number: float) -> LimitError:
+        return LimitError(
+            f"the tolerance of {self.aim / USED:.6g} mm asks for {number:.6g} rulings, "
+            f"limit {MOST}",
+            value=float(number),
+            limit=float(MOST),
+            remedy="raise the tolerance; is the part in the right units?",
+        )
 
     def laid(self, number: float) -> tuple[Placement, float]:
         """Strips of equal density, ``number`` of them (a fraction makes the last one smaller),
@@ -182,6 +188,8 @@ class _Segment:
             if following < floor or (best is not None and following >= len(best.t) - 1):
                 break
             number = following
+            if number > MOST:
+                raise self._too_many(number)
         return best if best is not None else trial
 
     def spent(self, number: int) -> Placement:

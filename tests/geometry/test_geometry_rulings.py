@@ -115,3 +115,24 @@ def test_breaks_do_not_leave_a_patch_of_many_strips_below_its_tolerance(tmp_path
     (t,) = panel.rulings
     assert len(t) - 1 >= 16
     assert 0.85 * 0.2 <= panel.mesh.deviation <= 0.2
+
+
+def test_an_edge_that_waves_three_hundred_times_is_seen(tmp_path):
+    job = tmp_path / "job.toml"
+    job.write_text(
+        'name = "job"\ntolerance = 0.1\n[surface]\nkind = "cylinder"\nradius = 300\n'
+        'extent = [0, "60 + 4*sin(300*t)"]\n'
+    )
+    (panel,) = devcad.build(job).panels
+    (t,) = panel.rulings
+    patch = panel.chain.patches[0]
+    assert len(t) > 6 * 300  # no wave without its strips
+    # sagitta of every chord on the wavy edge, at places of their own
+    middle = t[:-1] + 0.37 * np.diff(t)
+    ends, points = (patch.point(x, patch.frame(x).v_to) for x in (t, middle))
+    away = points - (ends[:-1] + 0.37 * np.diff(ends, axis=0))
+    assert np.linalg.norm(away, axis=1).max() <= 1.3 * 0.1  # measured along, not across, the chord
+    chord = np.diff(ends, axis=0)
+    chord /= np.linalg.norm(chord, axis=1)[:, None]
+    across = np.linalg.norm(away - (away * chord).sum(axis=1)[:, None] * chord, axis=1)
+    assert across.max() <= 0.1
