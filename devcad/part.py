@@ -17,10 +17,10 @@ from devcad.mesh.mesh import Mesh
 class Panel:
     """One piece cut from one sheet.
 
-    ``chain`` is the middle surface as it stands in space; ``shapes[k]`` says what patch k is
-    (an analytic surface with its numbers, or none); ``skins`` are (n-offsets) 0 alone for a
-    surface, -T/2 and +T/2 for a sheet of thickness T. ``rulings[k]`` are the certified
-    parameters of patch k. ``facts`` are the panel's entries for the report.
+    ``chain`` is the middle surface as it stands in space (partly bent, if the job says so);
+    ``shapes[k]`` says what its patch k is: an analytic surface with its numbers, or none.
+    ``thickness`` is 0 for a surface. ``rulings[k]`` are the certified parameters of patch k.
+    ``facts`` are the panel's entries for the report.
     """
 
     name: str

@@ -180,7 +180,7 @@ def _sample_kinds() -> Iterator[str]:
 
 
 TEXT = {".py", ".toml", ".md", ".csv", ".cjs", ".json", ".svg", ""}
-PRIVATE = ("/home/", "/root/", "/Users/", "/tmp/", "/work/", "C:\\Users")
+PRIVATE = (*(f"/{folder}/" for folder in ("home", "root", "Users", "tmp", "work")), "C:\\Users")
 
 
 def test_no_file_names_a_place_of_one_machine() -> None:
