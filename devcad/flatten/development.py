@@ -32,10 +32,15 @@ class Development:
         """The images of e(t), (n, 2), unit."""
         return _direction(self.series(t)[:, 0])
 
+    def rulings(self, t: Array) -> tuple[Array, Array]:
+        """The images of c0(t) and of e(t), each (n, 2), at the cost of one."""
+        at = self.series(t)
+        return at[:, 1:3], _direction(at[:, 0])
+
     def points(self, t: Array, v: Array) -> Array:
         """The images of the surface points (t, v), each (n,), shape (n, 2)."""
-        at = self.series(t)
-        return np.asarray(at[:, 1:3] + v[:, None] * _direction(at[:, 0]))
+        origin, direction = self.rulings(t)
+        return np.asarray(origin + v[:, None] * direction)
 
     def grid(self, t: Array, fractions: Array, v_from: Array, v_to: Array) -> Array:
         """The images of k points on each of n rulings, at equal fractions of the extent.

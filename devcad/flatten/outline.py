@@ -118,10 +118,10 @@ def _rail_edges(name: str, patch: Patch, development: Development) -> list[Edge]
         f = patch.frame(t)
         jet = patch.jet(t, 1)
         v, slope = (jet.v_to if top else jet.v_from)[:2]
-        e = development.direction(t)
+        origin, e = development.rulings(t)
         m = np.column_stack([-e[:, 1], e[:, 0]])
         tangent = (f.p + slope)[:, None] * e + (f.q + v * f.a)[:, None] * m
-        return development.points(t, v), tangent
+        return origin + v[:, None] * e, tangent
 
     knots = patch.segments
     inner = knots[1:-1]

@@ -136,7 +136,8 @@ class _Segment:
         self.patch, self.layers, self.aim = patch, layers, USED * tolerance
         inner = [x for x in panels(patch) if low < x < high]
         pieces = itertools.pairwise([low, *inner, high])
-        self.grid = np.unique(np.concatenate([np.linspace(a, b, GRID) for a, b in pieces]))
+        starts = [np.linspace(a, b, GRID)[:-1] for a, b in pieces]
+        self.grid = np.concatenate([*starts, [high]])
         inside = 0.5 * (self.grid[1:] + self.grid[:-1])
         step = np.diff(self.grid)
         weight = np.maximum(_density(patch, layers, inside, tolerance), 0.0) * step
