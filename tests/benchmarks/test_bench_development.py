@@ -2,6 +2,7 @@
 
 import os
 import resource
+import statistics
 import subprocess
 import sys
 import time
@@ -65,5 +66,6 @@ def test_checking_an_analytic_sample_costs_at_most_three_imports_of_numpy(tmp_pa
     check, numpy = ["-m", "devcad", "check", "samples/lampshade.toml"], ["-c", "import numpy"]
     cost(*check)
     cost(*numpy)
-    ratio = min(cost(*check) for _ in range(9)) / min(cost(*numpy) for _ in range(9))
+    # in turn, so that what slows the machine slows both; one disturbed pair does not decide
+    ratio = statistics.median(cost(*check) / cost(*numpy) for _ in range(11))
     assert ratio <= 3.0, f"{ratio:.2f} imports of numpy"
