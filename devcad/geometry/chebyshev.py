@@ -161,14 +161,6 @@ def transform(number: int) -> Array:
 
 
 @lru_cache(maxsize=16)
-def evaluation(number: int) -> Array:
-    """The matrix from Chebyshev coefficients to values at the extrema, (N, N)."""
-    k = np.arange(number)
-    last = number - 1
-    return np.asarray(np.cos((np.outer(last - k, k) % (2 * last)) * (np.pi / last)))
-
-
-@lru_cache(maxsize=16)
 def integration_of_values(number: int) -> Array:
     """The matrix from values at the extrema of [-1, 1] to integrals from -1, (N, N)."""
     coefficients = integration(number) @ transform(number)  # (N + 1, N)
