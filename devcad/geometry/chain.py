@@ -42,7 +42,7 @@ class Chain:
     ``closing`` is the joint from the last patch to the first where the last ruling is the first
     one, else None: a tube. ``closes`` is False where a closed base curve came back with another
     ruling, and ``closing_angle`` is then the angle between the two in radians. ``orientable`` is
-    False on a Moebius band. ``gap`` is the width in mm that was left out at the seam, 0 if none.
+    False on a Moebius band.
     """
 
     patches: tuple[Patch, ...]
@@ -51,7 +51,6 @@ class Chain:
     closes: bool | None = None
     closing_angle: float | None = None
     orientable: bool = True
-    gap: float = 0.0
 
     @property
     def closed(self) -> bool:
@@ -162,7 +161,7 @@ def with_gap(chain: Chain, gap: float) -> Chain:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if width(middle) >= gap else (low, middle)
     kept = last.restricted(last.domain[0], low)
-    return replace(chain, patches=(*chain.patches[:-1], kept), closing=None, gap=gap)
+    return replace(chain, patches=(*chain.patches[:-1], kept), closing=None)
 
 
 def _merged(first: Patch, second: Patch) -> Patch:
