@@ -6,8 +6,8 @@ regular, develop, bend, place rulings, mesh, and prove the result.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -20,6 +20,7 @@ from devcad.flatten.development import Development, develop_chain
 from devcad.flatten.outline import lay_out
 from devcad.geometry.chain import SMOOTH, Chain, cut_at, link, with_gap
 from devcad.geometry.classify import Shape, classify, patch_box
+from devcad.geometry.drawing import Drawing
 from devcad.geometry.layers import at_apex, straight_sided
 from devcad.geometry.parallel import parallel_chain
 from devcad.geometry.patch import Patch
@@ -42,7 +43,8 @@ STEEPEST_MITRE = np.radians(150.0)
 class PanelSpec:
     """A panel as its construction made it: patches in the job's units, and how to cut it.
 
-    ``gap`` is in mm; ``place`` is a rigid motion (4, 4) applied last, or None.
+    ``gap`` is in mm; ``place`` is a rigid motion (4, 4) applied last, or None. ``drawings`` are
+    in the job's units too; ``figures`` (in mm) and ``notes`` go to the report as they are.
     """
 
     name: str
@@ -53,6 +55,9 @@ class PanelSpec:
     cut: float | None
     gap: float
     place: Array | None
+    drawings: tuple[Drawing, ...] = ()
+    figures: Mapping[str, float] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
 
 
 def assemble(
@@ -148,6 +153,7 @@ def _panel(
     require(checks, allow)
     failed = sorted({check.name for check in checks if not check.passed})
     facts: dict[str, Any] = panel_facts(panel, middle, shapes, checks, any(apex), failed)
+    facts |= {"figures": dict(spec.figures), "notes": list(spec.notes)}
     return replace(panel, facts=facts), checks
 
 

@@ -187,10 +187,11 @@ def new(
     kind: Annotated[str, typer.Argument(metavar="KIND", help="A kind of surface.")],
 ) -> int:
     """Print a commented job file to start from."""
-    from devcad.job.templates import TEMPLATES, template
+    from devcad.job.templates import template, template_kinds
 
-    if kind not in TEMPLATES:
-        _usage(f'there is no surface kind "{kind}"', kind, TEMPLATES)
+    kinds = template_kinds()
+    if kind not in kinds:
+        _usage(f'there is no surface kind "{kind}"', kind, kinds)
     console.say(template(kind).rstrip("\n"))
     return 0
 

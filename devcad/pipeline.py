@@ -176,14 +176,20 @@ def _specs(panel: JobPanel, job: Job) -> list[PanelSpec]:
         PanelSpec(
             name=f"{stem}{k}" if several else panel.name,
             kind=panel.kind,
-            patches=patches,
-            base_closed=built.base_closed,
+            patches=made.patches,
+            base_closed=made.base_closed,
+            drawings=made.drawings,
+            figures={
+                name: figure.value * job.mm_per_unit**figure.length
+                for name, figure in made.figures.items()
+            },
+            notes=made.notes,
             mm_per_unit=job.mm_per_unit,
             cut=getattr(panel.surface, "cut", None),
             gap=getattr(panel.surface, "gap", 0.0) * job.mm_per_unit,
             place=panel.place,
         )
-        for k, patches in enumerate(built.panels, start=1)
+        for k, made in enumerate(built.panels, start=1)
     ]
 
 

@@ -39,6 +39,8 @@ PANEL_FACTS = (
     "cut_length",
     "pierces",
     "mass_g",
+    "figures",
+    "notes",
 )
 """The keys of a panel's facts that the report repeats, in its order; design.md section 6."""
 

@@ -21,8 +21,8 @@ def build(**table: Any) -> Built:
 
 def patches(**table: Any) -> tuple[Patch, ...]:
     """The patches of a one-panel surface."""
-    (chain,) = build(**table).panels
-    return chain
+    (panel,) = build(**table).panels
+    return panel.patches
 
 
 def patch(**table: Any) -> Patch:

@@ -52,8 +52,9 @@ def test_a_full_sweep_closes_the_base_curve(sweep, closed):
         {"kind": "frustum", "top_radius": 1, "height": 1},
     ):
         built = build(**table, radius=2, sweep=sweep)
-        assert built.base_closed is closed
-        assert built.panels[0][0].domain[1] == pytest.approx(np.radians(sweep), rel=1e-15)
+        (panel,) = built.panels
+        assert panel.base_closed is closed
+        assert panel.patches[0].domain[1] == pytest.approx(np.radians(sweep), rel=1e-15)
 
 
 def test_mitred_pipe_has_the_area_of_a_tube_of_its_mean_length():

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from devcad.geometry.constructions.base import Built, Closable, Surface
+from devcad.geometry.constructions.base import Built, BuiltPanel, Closable, Surface
 
 ROWS = {
     "plane": "Plane",
@@ -52,4 +52,4 @@ def surface_spec() -> Any:
     return Annotated[reduce(or_, SURFACES.values()), Field(discriminator="kind")]
 
 
-__all__ = ["SURFACES", "Built", "Closable", "Surface", "surface_spec"]
+__all__ = ["SURFACES", "Built", "BuiltPanel", "Closable", "Surface", "surface_spec"]

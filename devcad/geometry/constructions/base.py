@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
 from functools import partial
 from typing import Annotated
 
@@ -22,17 +22,53 @@ from devcad.geometry.constructions.sampling import (
 )
 from devcad.geometry.curve import Curve
 from devcad.geometry.curves import FULL_TURN, ConstantExpression, Model, ScalarExpression, Sweep
+from devcad.geometry.drawing import Drawing
 from devcad.geometry.patch import Patch, RulingJet
 from devcad.geometry.taylor import Array
 
 
 @dataclass(frozen=True, slots=True)
 class Built:
-    """The panels of a surface, each a chain of patches, the next joined to the previous along a
-    ruling. ``base_closed`` says that the base curve returns to its start point."""
+    """The panels of a surface, in order."""
 
-    panels: tuple[tuple[Patch, ...], ...]
+    panels: tuple[BuiltPanel, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class BuiltPanel:
+    """A chain of patches, the next joined to the previous along a ruling.
+
+    ``base_closed`` says that the base curve returns to its start point. ``drawings`` are lines
+    on the sheet, ``figures`` numbers by name that the report repeats in mm, ``notes`` sentences
+    that it repeats: what a user must know of this construction.
+    """
+
+    patches: tuple[Patch, ...]
     base_closed: bool = False
+    drawings: tuple[Drawing, ...] = ()
+    figures: Mapping[str, Figure] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """A number in the job's units to the power ``length``: 1 a length, 2 an area, 0 a ratio."""
+
+    value: float
+    length: int = 1
+
+
+def one_panel(
+    patches: Iterable[Patch],
+    base_closed: bool = False,
+    *,
+    drawings: tuple[Drawing, ...] = (),
+    figures: Mapping[str, Figure] | None = None,
+    notes: tuple[str, ...] = (),
+) -> Built:
+    """A surface of one panel."""
+    panel = BuiltPanel(tuple(patches), base_closed, drawings, figures or {}, notes)
+    return Built((panel,))
 
 
 def _counterclockwise(value: float) -> float:
@@ -92,7 +128,7 @@ def strip(piece: Curve, rays: Rays, extent: Extent, *, causal: str | None = None
         JobError: the extent is not finite and increasing on a dense sample.
     """
 
-    def field(t: Array, order: int) -> RulingJet:
+    def rulings(t: Array, order: int) -> RulingJet:
         c0, e, unit = rays(t, order)
         low, high = (edge.at(t, order) for edge in extent)
         if unit is None:
@@ -113,7 +149,7 @@ def strip(piece: Curve, rays: Rays, extent: Extent, *, causal: str | None = None
             limit=high,
             remedy="give from < to for every t",
         )
-    return Patch(field, piece.domain, piece.breaks, causal)
+    return Patch(rulings, piece.domain, piece.breaks, causal)
 
 
 def sound(curve: Curve, name: str, *, order: int = 2) -> tuple[Curve, ...]:

@@ -13,6 +13,7 @@ from devcad.geometry.constructions.base import (
     Closable,
     Extent,
     constant_extent,
+    one_panel,
     require_across,
     require_apart,
     sound,
@@ -45,7 +46,7 @@ class Cone(Closable):
         curve = self.directrix.curve()
         apex = np.array(self.apex)
         patches = (_patch(piece, apex, self.extent) for piece in sound(curve, "directrix"))
-        return Built((tuple(patches),), curve.closed)
+        return one_panel(patches, curve.closed)
 
 
 def _patch(piece: Curve, apex: Array, extent: Extent) -> Patch:

@@ -15,6 +15,7 @@ from devcad.geometry.constructions.base import (
     Turn,
     circle,
     constant_extent,
+    one_panel,
     require_across,
     sound,
     strip,
@@ -72,7 +73,7 @@ class Cylinder(Closable):
         direction = unit(self.direction or (0.0, 0.0, 1.0))
         extent = self.extent or constant_extent(0.0, self.length or 0.0)
         patches = (_patch(piece, direction, extent) for piece in sound(curve, "directrix"))
-        return Built((tuple(patches),), curve.closed)
+        return one_panel(patches, curve.closed)
 
     def _curve(self) -> Curve:
         if self.directrix is not None:

@@ -9,7 +9,15 @@ from pydantic import model_validator
 
 from devcad.errors import JobError
 from devcad.geometry import taylor
-from devcad.geometry.constructions.base import Built, Closable, NonNegative, Turn, circle, closes
+from devcad.geometry.constructions.base import (
+    Built,
+    Closable,
+    NonNegative,
+    Turn,
+    circle,
+    closes,
+    one_panel,
+)
 from devcad.geometry.curves import FULL_TURN, Positive
 from devcad.geometry.patch import Patch, RulingJet
 from devcad.geometry.taylor import Array
@@ -55,4 +63,4 @@ class Frustum(Closable):
                 taylor.constant(slant, order, t.size),
             )
 
-        return Built(((Patch(field, (0.0, self.sweep)),),), closes(self.sweep))
+        return one_panel((Patch(field, (0.0, self.sweep)),), closes(self.sweep))

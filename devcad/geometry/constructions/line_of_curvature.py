@@ -16,6 +16,7 @@ from devcad.geometry.constructions.base import (
     Closable,
     Extent,
     Rays,
+    one_panel,
     sound,
     square,
     strip,
@@ -78,7 +79,7 @@ class LineOfCurvature(Closable):
         """
         curve = self.curve.curve()
         with np.errstate(over="ignore", invalid="ignore"):  # a huge rapidity: see _require_slope
-            return Built((tuple(self._patches(curve)),), curve.closed)
+            return one_panel(self._patches(curve), curve.closed)
 
     def _patches(self, curve: Curve) -> Iterator[Patch]:
         """The patches in order, each beginning with the ruling that the one before ended with."""

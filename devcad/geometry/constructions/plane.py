@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 
 from devcad.geometry import taylor
-from devcad.geometry.constructions.base import Built, Surface
+from devcad.geometry.constructions.base import Built, Surface, one_panel
 from devcad.geometry.curves import Positive
 from devcad.geometry.patch import Patch, RulingJet
 from devcad.geometry.taylor import Array
@@ -32,4 +32,4 @@ class Plane(Surface):
                 taylor.constant(self.width, order, t.size),
             )
 
-        return Built(((Patch(field, (0.0, self.height)),),))
+        return one_panel((Patch(field, (0.0, self.height)),))

@@ -12,6 +12,7 @@ from devcad.geometry.constructions.base import (
     Built,
     Closable,
     Extent,
+    one_panel,
     smooth,
     square,
     strip,
@@ -52,7 +53,7 @@ class Rectifying(Closable):
             jet = piece.jet(t, order + 3)
             return jet[: order + 1], _ruling(jet), None
 
-        return Built(((strip(piece, rays, self.extent),),), curve.closed)
+        return one_panel((strip(piece, rays, self.extent),), curve.closed)
 
 
 def _ruling(jet: Array) -> Array:

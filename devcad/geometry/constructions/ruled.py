@@ -16,6 +16,7 @@ from devcad.geometry.constructions.base import (
     Closable,
     Extent,
     constant_extent,
+    one_panel,
     require_apart,
     sound,
     square,
@@ -75,7 +76,7 @@ class Ruled(Closable):
         assert self.curve is not None and self.direction is not None and self.extent is not None
         curve = self.curve.curve()
         patches = (_along(piece, self.direction, self.extent) for piece in sound(curve, "curve"))
-        return Built((tuple(patches),), curve.closed)
+        return one_panel(patches, curve.closed)
 
 
 def _along(piece: Curve, direction: VectorExpression, extent: Extent) -> Patch:
@@ -102,7 +103,7 @@ def _between(first: Curve, second: Curve, extent: Extent | None) -> Built:
     sound(second, "rails[1]")
     first, second = joined(first, second)
     patches = (_rungs(a, b, extent) for a, b in zip(first.pieces(), second.pieces(), strict=True))
-    return Built((tuple(patches),), first.closed and second.closed)
+    return one_panel(patches, first.closed and second.closed)
 
 
 def _rungs(first: Curve, second: Curve, extent: Extent) -> Patch:

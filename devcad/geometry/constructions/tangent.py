@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Literal
 
 from devcad.geometry import taylor
-from devcad.geometry.constructions.base import Built, Closable, Extent, smooth, strip
+from devcad.geometry.constructions.base import Built, Closable, Extent, one_panel, smooth, strip
 from devcad.geometry.curves import CurveSpec
 from devcad.geometry.taylor import Array
 
@@ -35,4 +35,4 @@ class Tangent(Closable):
             jet = piece.jet(t, order + 1)
             return jet[:-1], taylor.unit(taylor.derivative(jet)), None
 
-        return Built(((strip(piece, rays, self.extent),),), curve.closed)
+        return one_panel((strip(piece, rays, self.extent),), curve.closed)
