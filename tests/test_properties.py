@@ -87,7 +87,7 @@ def test_a_tangent_surface_unrolls_to_the_turning_of_its_curve(equations):
     curvature, torsion, mean = equations
     curve = NaturalCurve(kind="natural", curvature=curvature, torsion=torsion, t=(0, 1))
     surface = Tangent(kind="tangent", curve=curve, extent=(0.1 / mean, 0.3 / mean))
-    (patch,) = surface.build().panels[0]
+    (patch,) = surface.build().panels[0].patches
     nodes, weights = np.polynomial.legendre.leggauss(60)
     k = eval(curvature, {"sin": np.sin, "t": 0.5 * (nodes + 1)})  # our own text
     turning = develop(patch).series(np.array([1.0]))[0, 0]
