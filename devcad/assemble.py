@@ -12,18 +12,20 @@ from typing import Any
 
 import numpy as np
 
-from devcad.checks import Check, require
+from devcad.checks import FOLLOWS, Check, require
 from devcad.errors import DevcadError, GeometryError
-from devcad.facts import panel_facts
+from devcad.facts import panel_facts, rail_facts, strain
 from devcad.flatten.bend import bent
 from devcad.flatten.development import Development, develop_chain
+from devcad.flatten.lorentz import Spacetime
 from devcad.flatten.outline import lay_out
 from devcad.geometry.chain import SMOOTH, Chain, cut_at, link, with_gap
 from devcad.geometry.classify import Shape, classify, patch_box
-from devcad.geometry.drawing import Drawing
-from devcad.geometry.layers import at_apex, straight_sided
+from devcad.geometry.drawing import Drawing, carried
+from devcad.geometry.layers import at_apex, layer_gaps, straight_sided
 from devcad.geometry.parallel import parallel_chain
 from devcad.geometry.patch import Patch
+from devcad.geometry.rail_fit import RailFit
 from devcad.geometry.rulings import place
 from devcad.geometry.taylor import Array
 from devcad.mesh.build import build_mesh
@@ -35,6 +37,8 @@ FLOAT32 = float(np.sqrt(3.0)) * 2.0**-24
 """Largest distance that rounding to float32 moves a point, per unit of its largest coordinate."""
 ATTEMPTS = 4
 """How often the rulings are placed anew for the sake of a thick sheet's volume."""
+APART = 1e-6
+"""Layers of neighbouring patches miss each other by more than this share of the thickness."""
 STEEPEST_MITRE = np.radians(150.0)
 """A crease of a thick sheet beyond this has no sensible mitre (design.md, section 7)."""
 
@@ -58,6 +62,7 @@ class PanelSpec:
     drawings: tuple[Drawing, ...] = ()
     figures: Mapping[str, float] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    rail_fit: RailFit | None = None
 
 
 def assemble(
@@ -117,8 +122,10 @@ def _panel(
     allow: frozenset[str],
 ) -> tuple[Panel, list[Check]]:
     layers = (-0.5 * thickness, 0.5 * thickness) if thickness else (0.0,)
-    described = _described(spec, tolerance)
-    checks = prove_surface(spec.name, described, (0.0,), reaches_apex=False)
+    if spec.rail_fit is not None and spec.rail_fit.max_twist is not None:
+        allow |= set(FOLLOWS["twist"])  # who accepts a twist accepts what follows from it
+    described, drawings = _described(spec, tolerance)
+    checks = prove_surface(spec.name, described, (0.0,), reaches_apex=False, fit=spec.rail_fit)
     require(checks, allow)
     middle = _middle(described, thickness, reference)
     if spec.gap:
@@ -139,30 +146,46 @@ def _panel(
     if thickness:
         _refuse_creases(middle, shapes)
         _refuse_thick_apex(shapes, apex)
-        checks = prove_surface(spec.name, middle, layers, reaches_apex=any(apex))
+        _refuse_layers_apart(middle, layers)
+        checks = prove_surface(spec.name, middle, layers, reaches_apex=any(apex), fit=spec.rail_fit)
         require(checks, allow)
     developments = develop_chain(middle)
     chain = middle if bend == 1.0 else bent(middle, developments, bend)
     mesh, rulings = _meshed(chain, layers, developments, tolerance)
-    pattern = lay_out(middle, developments, rulings)
+    pattern = lay_out(middle, developments, rulings, drawings)
     shapes3d = shapes if bend == 1.0 else tuple(classify(patch) for patch in chain.patches)
     panel = Panel(spec.name, spec.kind, chain, shapes3d, thickness, rulings, mesh, pattern)
+    panel = replace(panel, spacetime=_spacetime(spec, middle))
     checks += prove_pattern(
         panel, middle, developments, tolerance=tolerance, smallest_bend=smallest_bend
     )
     require(checks, allow)
     failed = sorted({check.name for check in checks if not check.passed})
     facts: dict[str, Any] = panel_facts(panel, middle, shapes, checks, any(apex), failed)
-    facts |= {"figures": dict(spec.figures), "notes": list(spec.notes)}
+    facts |= {"figures": {**spec.figures, **strain(checks)}, "notes": list(spec.notes)}
+    if spec.rail_fit is not None:
+        facts |= rail_facts(spec.rail_fit, spec.mm_per_unit)
     return replace(panel, facts=facts), checks
 
 
-def _described(spec: PanelSpec, tolerance: float) -> Chain:
-    """The surface that the job describes, in mm, in its place, opened at its cut."""
+def _described(spec: PanelSpec, tolerance: float) -> tuple[Chain, tuple[Drawing, ...]]:
+    """The surface that the job describes, in mm, in its place, opened at its cut; and what is
+    drawn on it."""
     matrix = np.eye(4) if spec.place is None else spec.place
     patches = tuple(patch.transformed(matrix, spec.mm_per_unit) for patch in spec.patches)
     chain = link(patches, base_closed=spec.base_closed, tolerance=tolerance)
-    return chain if spec.cut is None else cut_at(chain, spec.cut)
+    drawings = tuple(drawing.scaled(spec.mm_per_unit) for drawing in spec.drawings)
+    if spec.cut is None:
+        return chain, drawings
+    opened = cut_at(chain, spec.cut)
+    return opened, carried(drawings, chain, opened, spec.cut)
+
+
+def _spacetime(spec: PanelSpec, middle: Chain) -> Spacetime | None:
+    """The middle surface with the time axis, which its place turns, if it has one."""
+    if middle.patches[0].causal is None:
+        return None
+    return Spacetime(middle, np.eye(3)[2] if spec.place is None else spec.place[:3, 2])
 
 
 def _middle(chain: Chain, thickness: float, reference: str) -> Chain:
@@ -238,11 +261,26 @@ def _refuse_creases(chain: Chain, shapes: tuple[Shape, ...]) -> None:
             )
 
 
+def _refuse_layers_apart(chain: Chain, layers: tuple[float, ...]) -> None:
+    """The layers of neighbours meet along their ruling, unless one alone ends in an apex there."""
+    for number, gap in enumerate(layer_gaps(chain, layers)):
+        if gap > APART * (layers[-1] - layers[0]):
+            raise GeometryError(
+                f"regular: the layers of a thick sheet miss each other by {gap:.3g} mm at the "
+                f"joint t = {chain.patches[number].domain[1]:.6g}, where an apex in the middle of "
+                "the sheet ends on one side only",
+                value=gap,
+                limit=0.0,
+                remedy="give the part no thickness",
+            )
+
+
 def _refuse_thick_apex(shapes: tuple[Shape, ...], apex: tuple[bool, ...]) -> None:
     for shape, reached in zip(shapes, apex, strict=True):
-        if reached and shape.half_angle is None:
+        if reached and shape.type != "plane" and shape.half_angle is None:
             raise GeometryError(
                 "regular: the layers of a thick sheet end apart from one another at the apex of "
                 "a cone that is not a right circular one",
-                remedy="begin the extent a little above the apex, or give the part no thickness",
+                remedy="begin the extent a little above the apex, or give the part no thickness: "
+                "the pattern of its middle is the same",
             )

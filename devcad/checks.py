@@ -83,6 +83,7 @@ FOLLOWS = {"twist": ("isometry", "fold-back", "step-twist", "volume")}
 
 NAMES = (
     "twist",
+    "crease",
     "regular",
     "isometry",
     "mesh-deviation",

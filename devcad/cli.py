@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import warnings
 from collections.abc import Iterable, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 import typer
@@ -19,6 +20,7 @@ from devcad.interrupts import Interrupts
 from devcad.outcomes import work_through
 
 if TYPE_CHECKING:
+    from devcad.geometry.analysis import Analysis
     from devcad.job.load import Job
     from devcad.pipeline import Progress
 
@@ -38,6 +40,7 @@ Examples:
   devcad check lamp.toml
   devcad export lamp.toml
   devcad export *.toml --pipeline sheet-metal -o parts
+  devcad analyze curve.toml
 \b
 Exit codes: 0 done, 2 job file or usage, 3 geometry or a failed check,
 4 limits, 5 files, 70 a bug of ours.""",
@@ -52,6 +55,7 @@ Allow = Annotated[
     typer.Option(metavar="CHECK", help="Let a failed check pass; the report says so."),
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one array of reports.")]
+Out = Annotated[str, typer.Option("-o", "--out", metavar="OUT", help="Folder.")]
 
 
 @app.callback(invoke_without_command=True)
@@ -81,7 +85,7 @@ def export(
         str | None,
         typer.Option(metavar="FORMATS", help="step,stl,glb,dxf,svg instead of the recipe's."),
     ] = None,
-    out: Annotated[str, typer.Option("-o", "--out", metavar="OUT", help="Folder.")] = "out",
+    out: Out = "out",
     allow: Allow = None,
     as_json: AsJson = False,
 ) -> int:
@@ -141,6 +145,69 @@ def check(
         return check_lines(report)
 
     return work_through(jobs, work, as_json, lines, context.obj)
+
+
+@app.command(
+    epilog="""\b
+FILE is a job, or a file with a table [curve], such as
+  [curve]
+  kind = "helix"
+  radius = 30
+  pitch = 20
+  turns = 2
+\b
+Examples:
+  devcad analyze samples/auger-flight.toml
+  devcad analyze curve.toml --json -o figures"""
+)
+def analyze(
+    context: typer.Context,
+    file: Annotated[str, typer.Argument(metavar="FILE", help="A job, or a file with [curve].")],
+    out: Out = "out",
+    as_json: Annotated[bool, typer.Option("--json", help="Print one object.")] = False,
+) -> int:
+    """Tell what a curve is, and its developables; write one figure, OUT/<name>-analysis.svg."""
+    try:
+        found, figure = _analysis(file, out)
+    except Exception as error:
+        context.obj.check()
+        errors = console.failures(error, file)
+        for each in errors:
+            console.tell(each)
+        if as_json:
+            console.say_json(console.entry(errors[0], file))
+        return max(each.code for each in errors)
+    from devcad.report.analysis import analysis_lines, analysis_report
+
+    if as_json:
+        console.say_json(analysis_report(file, found, figure))
+    else:
+        for line in analysis_lines(found, figure):
+            console.say(line)
+    return 0
+
+
+def _analysis(file: str, out: str) -> tuple[list[tuple[str, Analysis]], str]:
+    """The curves of a file by their keys, what they are, and the path of the figure."""
+    from devcad.export.folder import publish_file
+    from devcad.geometry.analysis import analyze as analysed
+    from devcad.job.analysis import load_curves
+    from devcad.report.analysis import figure_subtitle
+    from devcad.report.figure import figure
+    from devcad.report.progress import ProgressLine
+
+    with ProgressLine() as progress:
+        curves = load_curves(file)
+        found = []
+        for named in curves.curves:
+            progress.show(f"{curves.name}: {named.name}")
+            try:
+                found.append((named.name, analysed(named.curve, named.spec)))
+            except DevcadError as error:
+                raise error.at(place=named.name) from None
+        drawn = figure(found[0][1], curves.name, figure_subtitle(*found[0]))
+        path = publish_file(Path(out), f"{curves.name}-analysis.svg", drawn.encode("ascii"))
+    return found, str(path)
 
 
 @app.command(

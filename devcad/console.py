@@ -39,9 +39,9 @@ def say(line: str) -> None:
     _write(f"{line}\n")
 
 
-def say_json(entries: list[dict[str, Any]]) -> None:
-    """One JSON array on stdout; as ``say``."""
-    say(json.dumps(entries, indent=2, ensure_ascii=False, allow_nan=False))
+def say_json(told: list[dict[str, Any]] | dict[str, Any]) -> None:
+    """One JSON array or object on stdout; as ``say``."""
+    say(json.dumps(told, indent=2, ensure_ascii=False, allow_nan=False))
 
 
 def flush() -> None:

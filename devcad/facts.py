@@ -7,9 +7,11 @@ from typing import Any
 import numpy as np
 
 from devcad.checks import Check
+from devcad.flatten.lorentz import lorentz_area
 from devcad.flatten.outline import enclosed_area, perimeter
 from devcad.geometry.chain import Chain
 from devcad.geometry.classify import EXACT, Shape, sample_parameters
+from devcad.geometry.rail_fit import RailFit
 from devcad.geometry.regularity import regression_curve, singularities, smallest_radius
 from devcad.part import Panel
 
@@ -57,8 +59,25 @@ def panel_facts(
         "cut_length": perimeter(panel.pattern.outline),
         "pierces": 1 + len(panel.pattern.holes),
         "mass_g": None,
+        "lorentz_area": None if panel.spacetime is None else lorentz_area(panel.spacetime),
         "allowed": allowed,
     }
+
+
+def rail_facts(fit: RailFit, mm_per_unit: float) -> dict[str, Any]:
+    """What the report says more of a panel that was looked for between rails: its creases, and how
+    far a rail was moved."""
+    return {
+        "max_crease_deg": fit.largest_crease,
+        "relaxed_mm": None if fit.relaxed is None else fit.relaxed * mm_per_unit,
+    }
+
+
+def strain(checks: list[Check]) -> dict[str, float]:
+    """The largest strain of a sheet that is bent to a surface although it twists; nothing where the
+    pattern is isometric. The first fundamental form differs by twice the strain."""
+    isometry = next(check for check in checks if check.name == "isometry")
+    return {} if isometry.passed else {"strain": 0.5 * isometry.value}
 
 
 def _finite(value: float) -> float | None:
@@ -88,6 +107,8 @@ def _type(chain: Chain, shapes: tuple[Shape, ...]) -> str:
     frames = [patch.frame(sample_parameters(patch, 9)) for patch in chain.patches]
     if all(shape.type == "plane" for shape in shapes) and all(j.smooth for j in chain.joints):
         return "plane"
+    if all(shape.type == "tangent" for shape in shapes) and all(j.smooth for j in chain.joints):
+        return "tangent"
     e = np.concatenate([frame.e for frame in frames])
     c0 = np.concatenate([frame.c0 for frame in frames])
     if np.linalg.norm(e - e[0], axis=1).max() <= EXACT:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from devcad.checks import Check
+from devcad.flatten.lorentz import Spacetime
 from devcad.flatten.pattern import Pattern
 from devcad.geometry.chain import Chain
 from devcad.geometry.classify import Shape
@@ -20,7 +21,8 @@ class Panel:
     ``chain`` is the middle surface as it stands in space (partly bent, if the job says so);
     ``shapes[k]`` says what its patch k is: an analytic surface with its numbers, or none.
     ``thickness`` is 0 for a surface. ``rulings[k]`` are the certified parameters of patch k.
-    ``facts`` are the panel's entries for the report.
+    ``facts`` are the panel's entries for the report. ``spacetime`` is the middle surface, not
+    bent, in Minkowski space, where it was constructed there.
     """
 
     name: str
@@ -32,6 +34,7 @@ class Panel:
     mesh: Mesh
     pattern: Pattern
     facts: dict[str, Any] = field(default_factory=dict)
+    spacetime: Spacetime | None = None
 
 
 @dataclass(frozen=True, slots=True)

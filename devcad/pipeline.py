@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from devcad.assemble import PanelSpec, assemble
-from devcad.checks import require
+from devcad.checks import FOLLOWS, require
 from devcad.errors import DevcadError, FileError
-from devcad.export import Options, Written, writer
+from devcad.export import DEFAULT_FORMATS, Options, Written, writer
 from devcad.export.folder import REPORT, published, unwritable
 from devcad.job.load import Job, JobPanel, load
 from devcad.job.recipe import Recipe, known_checks, known_formats, resolve
@@ -27,7 +27,6 @@ MESHES = {"stl", "glb"}
 """The formats that carry a panel's triangles."""
 CUTTING = ("gap", "cut")
 """The keys of a surface that only the assembly can judge; its errors begin with their names."""
-DEFAULT_FORMATS = ("step", "stl", "glb", "dxf", "svg")
 
 
 def _silent(_: str) -> None:
@@ -115,6 +114,8 @@ def export(
     """
     chosen = known_formats(list(formats))
     was_allowed = {check.name for check in part.checks if not check.passed}
+    if "isometry" in was_allowed:
+        was_allowed.update(FOLLOWS["twist"])
     allowed = frozenset(was_allowed.union(known_checks(list(allow))))
     target = Path(out, part.name)
     with published(Path(out), part.name) as folder:
@@ -184,6 +185,7 @@ def _specs(panel: JobPanel, job: Job) -> list[PanelSpec]:
                 for name, figure in made.figures.items()
             },
             notes=made.notes,
+            rail_fit=made.rail_fit,
             mm_per_unit=job.mm_per_unit,
             cut=getattr(panel.surface, "cut", None),
             gap=getattr(panel.surface, "gap", 0.0) * job.mm_per_unit,

@@ -12,6 +12,7 @@ from devcad.geometry.chain import Chain
 from devcad.geometry.classify import EXACT
 from devcad.geometry.layers import at_apex
 from devcad.geometry.patch import Frame, Patch
+from devcad.geometry.rail_fit import RailFit
 from devcad.geometry.regularity import (
     STRAIGHT,
     Clearance,
@@ -26,16 +27,28 @@ from devcad.mesh.mesh import Mesh
 from devcad.part import Panel
 
 TWIST_LIMIT_DEG = 0.01
+CREASE_LIMIT_DEG = 0.1
 ISOMETRY_LIMIT = 1e-9
 FOLD_BACK_LIMIT = 1e-8  # 1e-6 mm on 100 mm
 OVERLAP_LIMIT = 1e-9
 
 
 def prove_surface(
-    name: str, chain: Chain, layers: tuple[float, ...], *, reaches_apex: bool
+    name: str,
+    chain: Chain,
+    layers: tuple[float, ...],
+    *,
+    reaches_apex: bool,
+    fit: RailFit | None = None,
 ) -> list[Check]:
-    """The checks ``twist`` and ``regular`` of a chain, from c0 and e before anything else."""
-    return [_twist(name, chain), _regular(name, chain, layers, reaches_apex=reaches_apex)]
+    """The checks ``twist`` and ``regular`` of a chain, from c0 and e before anything else, and
+    ``crease`` where the surface was looked for between rails."""
+    creased = [] if fit is None else [_crease(name, fit)]
+    return [
+        _twist(name, chain, fit),
+        *creased,
+        _regular(name, chain, layers, reaches_apex=reaches_apex),
+    ]
 
 
 def prove_pattern(
@@ -69,19 +82,32 @@ def prove_pattern(
     return checks
 
 
-def _twist(name: str, chain: Chain) -> Check:
+def _crease(name: str, fit: RailFit) -> Check:
+    return at_most(
+        "crease",
+        name,
+        fit.crease,
+        CREASE_LIMIT_DEG,
+        "deg",
+        says=f"the sheet folds by {fit.crease:.4g} deg where no rail has a corner",
+        remedy=fit.advice,
+    )
+
+
+def _twist(name: str, chain: Chain, fit: RailFit | None) -> Check:
     patch, worst = _worst((p, twist(p)) for p in chain.patches)
     degrees = float(np.degrees(worst.value))
     return at_most(
         "twist",
         name,
         degrees if np.isfinite(degrees) else float("inf"),
-        TWIST_LIMIT_DEG,
+        fit.max_twist if fit is not None and fit.max_twist is not None else TWIST_LIMIT_DEG,
         "deg",
         where=_where(patch, worst),
         says=f"not developable at t = {worst.t:.6g}: the tangent plane turns {degrees:.4g} deg "
         "along the ruling",
-        remedy="choose rulings along which both boundary tangents and the ruling lie in one plane",
+        remedy=(fit.advice if fit is not None else "")
+        or "choose rulings along which both boundary tangents and the ruling lie in one plane",
     )
 
 

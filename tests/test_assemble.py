@@ -2,11 +2,14 @@
 
 import numpy as np
 import pytest
+from patches import frustum
 
 import devcad
 from devcad.assemble import PanelSpec, assemble
 from devcad.errors import GeometryError, LimitError
+from devcad.flatten.outline import perimeter
 from devcad.geometry import taylor
+from devcad.geometry.drawing import Drawing
 from devcad.geometry.patch import Patch, RulingJet
 from devcad.mesh.build import volume
 
@@ -203,3 +206,55 @@ def test_a_pipe_with_a_wavy_end_reaches_step(tmp_path):
     report = devcad.export(part, tmp_path / "out", formats=["step"])
     deviation = {check["name"]: check["value"] for check in report["checks"]}["step-deviation"]
     assert deviation <= 1e-4
+
+
+def circled(patches, cut=None, gap=0.0, mm_per_unit=1.0):
+    """A closed cone frustum with the parallel half way up and a line across it at t = 1."""
+    one = np.ones_like
+    lines = []
+    for k, patch in enumerate(patches):
+        around = Drawing("ENGRAVE", k, lambda u: (u, 65 * one(u), one(u), 0 * u), patch.domain)
+        lines.append(around)
+    across = Drawing("ENGRAVE", 0, lambda u: (one(u), u, 0 * u, one(u)), (0.0, 130.0))
+    spec = PanelSpec(
+        "p", "cone", patches, True, mm_per_unit, cut, gap, None, drawings=(*lines, across)
+    )
+    part = assemble(
+        "p", [spec], thickness=0, reference="middle", tolerance=0.05 * mm_per_unit, bend=1.0
+    )
+    return part.panels[0].pattern
+
+
+HALVES = (frustum().restricted(0, 2), frustum().restricted(2, 2 * np.pi))
+
+
+@pytest.mark.parametrize("patches", [(frustum(),), HALVES], ids=["one patch", "two"])
+@pytest.mark.parametrize("cut", [None, 0.4, 2.0, 5.0, 2 * np.pi])
+def test_drawings_stay_where_they_are_when_a_tube_is_opened_elsewhere(patches, cut):
+    # on the flattened frustum the parallel is 195 from the apex, whole, the other line radial;
+    # their angle from the first ruling is t sin(half angle)
+    pattern = circled(patches, cut)
+    arms = [(e, e.curve(e.u[[0, -1]])[0] - [260.0, 0.0]) for e in pattern.drawings]
+    around = [(e, arm) for e, arm in arms if abs(np.hypot(*arm[0]) - np.hypot(*arm[1])) < 1]
+    np.testing.assert_allclose([np.hypot(*arm.T) for _, arm in around], 195.0, rtol=1e-12)
+    length = sum(perimeter((e,)) for e, _ in around)
+    assert length == pytest.approx(2 * np.pi * 50 / 130 * 195, rel=1e-9)
+    ((_, across),) = [pair for pair in arms if pair[0] not in [e for e, _ in around]]
+    np.testing.assert_allclose(sorted(np.hypot(*across.T)), [130.0, 260.0], rtol=1e-12)
+    turned = np.pi - np.arctan2(across[0, 1], across[0, 0])
+    start = 0.0 if cut is None else cut
+    assert turned == pytest.approx((1 - start) % (2 * np.pi) * 50 / 130, rel=1e-12)
+
+
+def test_a_gap_cuts_the_drawings_that_it_removes():
+    # the gap of 10 mm at the lower edge, radius 100, is a chord: t = 2 pi - 2 asin(0.05)
+    (around, _) = circled((frustum(),), gap=10.0).drawings
+    angle = 2 * np.pi - 2 * np.arcsin(0.05)
+    assert perimeter((around,)) == pytest.approx(angle * 50 / 130 * 195, rel=1e-9)
+
+
+def test_drawings_are_in_the_units_of_the_job():
+    (around, across) = circled((frustum(),), mm_per_unit=25.4).drawings
+    arm = around.curve(around.u[:1])[0][0] - [260.0 * 25.4, 0.0]
+    assert np.hypot(*arm) == pytest.approx(195.0 * 25.4, rel=1e-12)
+    assert perimeter((across,)) == pytest.approx(130.0 * 25.4, rel=1e-12)

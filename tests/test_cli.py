@@ -76,6 +76,9 @@ USAGE = {
     ("list",): 2,
     ("list", "surface"): 2,
     ("new", "frustrum"): 2,
+    ("analyze", "--help"): 0,
+    ("analyze",): 2,
+    ("analyze", "one.toml", "two.toml"): 2,
 }
 
 
@@ -116,7 +119,7 @@ def test_help_shows_examples_and_exit_codes() -> None:
     done = started("--help")
     assert "devcad export lamp.toml" in done.stdout
     assert "0 done, 2 job file or usage, 3 geometry" in done.stdout
-    for command in ("export", "check", "list", "schema", "new"):
+    for command in ("export", "check", "analyze", "list", "schema", "new"):
         assert "devcad " + command in started(command, "--help").stdout
 
 
@@ -273,7 +276,7 @@ def test_a_usage_failure_is_an_array_for_programs(
 def test_an_unknown_format_of_three_letters_lists_the_formats(capsys: Captured) -> None:
     assert run(["export", "a.toml", "--to", "pdf"]) == 2
     assert capsys.readouterr().err == (
-        '--to: this version knows no format "pdf" (known: dxf, glb, step, stl, svg)\n'
+        '--to: this version knows no format "pdf" (known: dxf, glb, lorentz-svg, step, stl, svg)\n'
     )
 
 

@@ -57,7 +57,8 @@ def test_the_readme_lists_every_format() -> None:
     from devcad.export import FORMATS
 
     files = table_words(README, "## What comes out")
-    assert files == {f"lampshade.{suffix}" for suffix in FORMATS} | {"report.json"}
+    figure = {"lorentz-svg": "spacelike-cone-lorentz-not-for-cutting.svg"}
+    assert files == {figure.get(name, f"lampshade.{name}") for name in FORMATS} | {"report.json"}
 
 
 def test_the_readme_lists_every_check() -> None:

@@ -95,7 +95,7 @@ def test_the_report_has_the_keys_of_the_contract_in_order(lamp: Part, tmp_path: 
         "name kind type causal closed closes closing_angle_deg orientable watertight apex area "
         "flat_area flat_bbox min_radius max_twist_deg max_crease_deg relaxed_mm k_neutral "
         "k_source clearance singularities regression ruling_count cut_length pierces mass_g "
-        "figures notes allowed"
+        "lorentz_area figures notes allowed"
     )
     check = "name panel value limit unit passed where"
     assert list(report) == top.split()

@@ -50,7 +50,14 @@ FORMATS: dict[str, tuple[str, str]] = {
     "glb": ("devcad.export.glb", "glTF 2.0 binary, metres, Y up, UV0 = the flat pattern"),
     "dxf": ("devcad.export.dxf", "cut pattern, lines and arcs, mm"),
     "svg": ("devcad.export.svg", "cut pattern at true size"),
+    "lorentz-svg": (
+        "devcad.export.lorentz",
+        "Lorentzian unrolling of a Minkowski surface, a figure that is not for cutting",
+    ),
 }
+
+DEFAULT_FORMATS = ("step", "stl", "glb", "dxf", "svg")
+"""What is written where neither the caller nor the recipe says what."""
 
 
 def writer(name: str) -> Writer:

@@ -29,11 +29,23 @@ class Arc:
 
 
 @dataclass(frozen=True, slots=True)
+class Ellipse:
+    """An arc of an ellipse: ``x`` points along the major radius, the parameter is the eccentric
+    angle about ``axis`` from there."""
+
+    centre: Array
+    axis: Array
+    x: Array
+    major: float
+    minor: float
+
+
+@dataclass(frozen=True, slots=True)
 class Point:
     """No curve at all: the edge of a face that is drawn together in one vertex."""
 
 
-Curve = Line | Arc | Point | Spline
+Curve = Line | Arc | Ellipse | Point | Spline
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,6 +23,7 @@ from devcad.export._step_body import (
     Use,
 )
 from devcad.export._step_chart import Chart, heights
+from devcad.export._step_folds import Folds, reversed_equal, reversed_trace
 from devcad.export._step_rails import Piece
 from devcad.export._step_strips import Strip
 from devcad.export._step_walls import (
@@ -53,18 +54,23 @@ class Skin:
 class Draft:
     """The body while it grows: vertices, edges by their names, faces."""
 
-    def __init__(self, parts: list[Strip], corners: Array, size: float) -> None:
+    def __init__(self, parts: list[Strip], corners: Array, size: float, folds: Folds) -> None:
         self.size = size
+        self._folds = {
+            (parts[k].first, side): (parts[i].first, other)
+            for (k, side), (i, other) in folds.items()
+        }
         self.layers = corners.shape[2]
         self.corners = corners
         self.points: list[Array] = []
         self.edges: list[Edge] = []
         self.faces: list[Face] = []
         self._names: dict[tuple[object, ...], int] = {}
-        self._vertex_of = self._number_corners(parts)
+        self._vertex_of = self._number_corners(parts, folds)
 
-    def _number_corners(self, parts: list[Strip]) -> dict[tuple[int, int, int], int]:
-        """One vertex for each corner; corners that a collapsed edge draws together share one."""
+    def _number_corners(self, parts: list[Strip], folds: Folds) -> dict[tuple[int, int, int], int]:
+        """One vertex for each corner; corners that a collapsed edge draws together share one, and
+        so do those of long edges that lie on one another."""
         keys = list(np.ndindex(self.corners.shape[:3]))
         root = {key: key for key in keys}
 
@@ -78,6 +84,9 @@ class Draft:
                 if s.tips[side] and not (s.ruled and self.layers == 2):
                     for k in range(self.layers):
                         root[find((s.last, side, k))] = find((s.first, side, k))
+        for (k, side), (i, other) in folds.items():
+            for here, there in ((parts[k].first, parts[i].last), (parts[k].last, parts[i].first)):
+                root[find((here, side, 0))] = find((there, other, 0))
         for i, _, k in keys:
             if np.abs(self.corners[i, 0, k] - self.corners[i, 1, k]).max() <= FLOOR * self.size:
                 root[find((i, 1, k))] = find((i, 0, k))
@@ -158,16 +167,26 @@ class Draft:
             lambda: Edge(start, end, curve, piece.spans[layer], probes),
         )
 
+    def _long_use(self, skin: Skin, side: int, index: int, layer: int, *, forward: bool) -> Use:
+        """A piece of a long edge as its skin runs along it: the earlier strip's own edge, run
+        backwards, where the two lie on one another."""
+        piece = skin.sides[side][index]
+        source = self._folds.get((skin.strip.first, side))
+        shared = self._names.get(("long", *source, 0, layer)) if source else None
+        if shared is not None and len(skin.sides[side]) == 1:
+            known = self.edges[shared]
+            trace = reversed_trace(piece.traces[layer], piece.spans[layer], known.span)
+            if trace is not None and reversed_equal(piece.curves[layer], known.curve, self.size):
+                return Use(shared, not forward, trace)
+        return Use(self._long_edge(skin, side, index, layer), forward, piece.traces[layer])
+
     def _add_skin(self, skin: Skin, layer: int) -> None:
         """The front (last layer) or the back of a strip."""
         run = [self._ruling_use(skin, 0, layer)]
         for side, forward in ((1, True), (0, False)):
             pieces = skin.sides[side]
             order = range(len(pieces)) if forward else range(len(pieces) - 1, -1, -1)
-            uses = [
-                Use(self._long_edge(skin, side, i, layer), forward, pieces[i].traces[layer])
-                for i in order
-            ]
+            uses = [self._long_use(skin, side, i, layer, forward=forward) for i in order]
             run += [u for u in uses if self._drawn(u)]
             if forward:
                 end = self._ruling_use(skin, 1, layer)
@@ -337,7 +356,11 @@ def _skin_probes(skin: Skin, layer: int) -> tuple[Array | None, Array]:
     """Places on a skin and the true points there: on both edges and half way."""
     low, high = skin.true[:, 0, layer], skin.true[:, 1, layer]
     points = np.concatenate([low, 0.5 * (low + high), high])
-    if not skin.strip.ruled:
+    surface = skin.surfaces[layer]
+    if not isinstance(surface, Ruled):
         return None, points
     u = 0.0 if layer == len(skin.strip.layers) - 1 else 1.0
-    return grid(skin.places, (u, 0.5, 1.0 - u)), points
+    places = grid(skin.places, (u, 0.5, 1.0 - u))
+    weights = [x.denominator(skin.places) for x in (surface.low, surface.high)]
+    places[len(low) : -len(low), 0] = weights[0] / (weights[0] + weights[1])
+    return places, points

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from devcad.errors import GeometryError
-from devcad.export._step_body import Body, Plane, Point, Ruled, Straight, Surface
+from devcad.export._step_body import Body, Plane, Point, Ruled, Straight, Surface, Trace
 from devcad.export._step_chart import chart
+from devcad.export._step_conics import arc_edge
 from devcad.export._step_draft import Draft, Skin
+from devcad.export._step_folds import folds, mirrored_knots, split
 from devcad.export._step_rails import EDGE_TOLERANCE, LongEdge, Piece, fitted_rails
 from devcad.export._step_strips import Strip, panel_size, strips
 from devcad.geometry.fit import FLOOR, Spline
@@ -28,11 +31,15 @@ def body(panel: Panel, tolerance: float, degree: int) -> Body:
     Raises:
         GeometryError: the fit is not reached, or patches and layers do not meet.
     """
-    parts, count = strips(panel)
     size = panel_size(panel)
+    parts, count = split(*strips(panel), size)
     corners, lifts = _corners(parts, count, size)
-    draft = Draft(parts, corners, size)
-    skins = [_skin(s, draft, lifts[k], tolerance, degree) for k, s in enumerate(parts)]
+    folded = folds(parts, size)
+    draft = Draft(parts, corners, size, folded)
+    skins: list[Skin] = []
+    for k, strip in enumerate(parts):
+        start = _start(strip, [skins[i] for (j, _), (i, _) in folded.items() if j == k])
+        skins.append(_skin(strip, draft, lifts[k], tolerance, degree, start))
     for skin in skins:
         draft.add_strip(skin)
     if panel.thickness and count > len(parts):
@@ -48,7 +55,18 @@ def body(panel: Panel, tolerance: float, degree: int) -> Body:
     )
 
 
-def _skin(strip: Strip, draft: Draft, lifts: Array, tolerance: float, degree: int) -> Skin:
+def _start(strip: Strip, folded: list[Skin]) -> Array | None:
+    """The knots for a strip of which a long edge is an earlier one's run backwards: that one's."""
+    for skin in folded:
+        surface = skin.surfaces[0]
+        if strip.ruled and isinstance(surface, Ruled):
+            return mirrored_knots(surface.low.knots, strip)
+    return None
+
+
+def _skin(
+    strip: Strip, draft: Draft, lifts: Array, tolerance: float, degree: int, start: Array | None
+) -> Skin:
     """Surfaces and long edges of one strip."""
     if lifts.any() and strip.shape.type != "plane":
         raise GeometryError(
@@ -57,23 +75,25 @@ def _skin(strip: Strip, draft: Draft, lifts: Array, tolerance: float, degree: in
         )
     if strip.ruled:
         fine = max(tolerance * min(1.0, draft.size / AREA_SIZE), FLOOR * draft.size)
-        return _fitted_skin(strip, draft.corner_points(strip), fine, degree)
+        return _fitted_skin(strip, draft.corner_points(strip), fine, degree, start)
     edge = min(tolerance, max(EDGE_TOLERANCE, 3e-12 * draft.size))
     return _exact_skin(strip, draft, lifts, edge, degree)
 
 
-def _fitted_skin(strip: Strip, corners: Array, tolerance: float, degree: int) -> Skin:
-    """A strip whose faces are fitted."""
-    result, probe, true = fitted_rails(strip, corners, tolerance, degree)
+def _fitted_skin(
+    strip: Strip, corners: Array, tolerance: float, degree: int, start: Array | None
+) -> Skin:
+    """A strip whose faces are splines: the surface itself where it is one, else fitted."""
+    rails, probe, true = fitted_rails(strip, corners, tolerance, degree, start)
     layers = len(strip.layers)
     columns = [
         [slice(3 * k, 3 * k + 3) for k in range(layers * s, layers * s + layers)] for s in (0, 1)
     ]
-    low, high = ([result.spline.part(c) for c in side] for side in columns)
+    low, high = ([rails.part(c) for c in side] for side in columns)
     surfaces = [Ruled(b, a) for a, b in zip(low, high, strict=True)]
     surfaces[-1] = Ruled(low[-1], high[-1])  # the front
     sides = [
-        [_rail_piece(strip, s, rails, corners, probe, true)] for s, rails in enumerate((low, high))
+        [_rail_piece(strip, s, side, corners, probe, true)] for s, side in enumerate((low, high))
     ]
     return Skin(strip, tuple(surfaces), (sides[0], sides[1]), None, probe, true)
 
@@ -107,11 +127,11 @@ def _rail_piece(
     s = strip.course.s
     layers = len(rails)
     tip = strip.tips[side] and layers == 1
-    traces = []
+    traces: list[Trace] = []
     for k in range(layers):
         u = float(side) if k == layers - 1 else float(1 - side)
         traces.append(Straight(np.array([u, 0.0]), np.array([0.0, 1.0])))
-    return Piece(
+    plain = Piece(
         (float(strip.ends[0]), float(strip.ends[1])),
         corners[:, side],
         (Point(),) * layers if tip else tuple(rails),
@@ -119,6 +139,12 @@ def _rail_piece(
         tuple(traces),
         (probe, true[:, side]),
     )
+    found = None if tip or layers > 1 else arc_edge(rails[0])
+    if found is None:
+        return plain
+    (curve, span), along = found
+    image = np.concatenate([np.full_like(along.poles, float(side)), along.poles], axis=1)
+    return replace(plain, curves=(curve,), spans=(span,), traces=(replace(along, poles=image),))
 
 
 def _outward(strip: Strip) -> list[Array]:

@@ -82,7 +82,7 @@ def _prove(body: Body, shape: TopoDS_Shape, size: float) -> Proof:
         raise _wrong(f"edges and vertices hold only to {loose:.3g} mm", body.name)
     measured = [_face(f, s) for f, s in zip(body.faces, faces, strict=True)]
     deviation = max([d for d, _ in measured] + [_edges(body, shape)])
-    fitted = any(isinstance(e.curve, Spline) for e in body.edges)
+    fitted = any(isinstance(e.curve, Spline) and not e.curve.exact for e in body.edges)
     return Proof(
         deviation if fitted or deviation > FLOOR * size else 0.0,
         max(w for _, w in measured),

@@ -2,24 +2,27 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 
 from devcad.export._step_body import Arc, Cone, Curve, Cylinder, Line, Point, Straight, Trace
 from devcad.export._step_chart import Chart, heights
+from devcad.export._step_conics import ellipse_edge
 from devcad.export._step_strips import Strip, smooth_courses
+from devcad.geometry.conic import arcs
 from devcad.geometry.fit import (
     FLOOR,
     TWIST_LIMIT,
     Course,
     Demand,
     Ends,
-    Fit,
+    Spline,
     fit,
     ruled_twist,
 )
+from devcad.geometry.polynomial import polynomial
 from devcad.geometry.taylor import Array
 
 EDGE_TOLERANCE = 3e-8  # mm: an edge on an exact face, twice (space and place) below 1e-7
@@ -45,30 +48,49 @@ class Piece:
 
 
 def fitted_rails(
-    strip: Strip, corners: Array, tolerance: float, degree: int
-) -> tuple[Fit, Array, Array]:
-    """All edges of a fitted strip as one fit; ``corners`` (2 ends, 2 sides, layers, 3).
+    strip: Strip, corners: Array, tolerance: float, degree: int, start: Array | None = None
+) -> tuple[Spline, Array, Array]:
+    """All edges of a general strip side by side, as they are or as one fit; ``corners`` (2 ends,
+    2 sides, layers, 3); ``start`` = distinct knots to be tried first.
 
-    Returns the fit, its probe parameters (k,) and the true points there (k, 2, layers, 3).
+    Returns the spline, its probe parameters (k,) and the true points there (k, 2, layers, 3).
     """
-    layers = len(strip.layers)
-    blocks = tuple(slice(3 * k, 3 * k + 3) for k in range(2 * layers))
-    faces = tuple((blocks[k], blocks[layers + k]) for k in range(layers))
+
+    def rails(t: Array) -> Array:
+        return strip.rails(t).reshape(len(t), -1)
+
+    ends = corners[0].ravel(), corners[1].ravel()
+    spline = polynomial(rails, strip.course, ends)
+    if spline is None and len(strip.layers) == 1:
+        found = arcs(rails, strip.course, ends)
+        if found is not None:  # its parameter is not the patch's: each point at its own place
+            return found.spline, found.s, strip.rails(found.t)
+    if spline is None:
+        held = Ends(ends, _end_slopes(strip))
+        demand = _demand(strip, tolerance, degree)
+        spline = fit(rails, strip.course, held, demand, start).spline
+    probe = _probe_places(spline)
+    return spline, probe, strip.rails(strip.course(probe))
+
+
+def _end_slopes(strip: Strip) -> tuple[Array, Array] | None:
+    """d/ds of all edges at both ends, where they are finite."""
     t, s = strip.course.t, strip.course.s
     speeds = np.diff(t)[[0, -1]] / np.diff(s)[[0, -1]]
     slopes = strip.end_slopes().reshape(2, -1) * speeds[:, None]
+    layers = len(strip.layers)
     for side in np.flatnonzero(np.array(strip.tips)):
         if layers == 1:
-            slopes[:, blocks[side]] = 0.0
-    held = (slopes[0], slopes[1]) if np.isfinite(slopes).all() else None
-    result = fit(
-        lambda x: strip.rails(x).reshape(len(x), -1),
-        strip.course,
-        Ends((corners[0].ravel(), corners[1].ravel()), held),
-        Demand(degree, tolerance, blocks, faces, *_thickness(strip, blocks), _twist_limit(strip)),
-    )
-    probe = _probe_places(result)
-    return result, probe, strip.rails(strip.course(probe))
+            slopes[:, 3 * side : 3 * side + 3] = 0.0
+    return (slopes[0], slopes[1]) if np.isfinite(slopes).all() else None
+
+
+def _demand(strip: Strip, tolerance: float, degree: int) -> Demand:
+    """What a fit of the strip's edges must reach."""
+    layers = len(strip.layers)
+    blocks = tuple(slice(3 * k, 3 * k + 3) for k in range(2 * layers))
+    faces = tuple((blocks[k], blocks[layers + k]) for k in range(layers))
+    return Demand(degree, tolerance, blocks, faces, *_thickness(strip, blocks), _twist_limit(strip))
 
 
 def _twist_limit(strip: Strip) -> float:
@@ -226,8 +248,10 @@ class LongEdge:
         return Piece(_two(t), corners, tuple(curves), spans, tuple(traces), probes)
 
     def _free(self, course: Course) -> Piece:
-        """A fitted edge: all layers and their traces on the skins in one fit."""
+        """An ellipse, or a fitted edge: all layers and their traces on the skins in one fit."""
         t = course.t[[0, -1]]
+        if len(self.strip.layers) == 1 and (found := self._ellipse(t)) is not None:
+            return found
         corners = self._ends(t)
         scale = self._angle_scale()
         rows = self._rows(t, corners, scale)
@@ -235,27 +259,43 @@ class LongEdge:
         width = 3 if self.skins is None else 5
         spaces = [slice(width * k, width * k + 3) for k in range(layers)]
         places = [slice(width * k + 3, width * k + 5) for k in range(layers) if width == 5]
-        result = fit(
-            lambda x: self._rows(x, self._lifted(x, t), scale),
-            course,
-            Ends((rows[0], rows[1])),
-            Demand(self.degree, self.tolerance, (*spaces, *places)),
-        )
+
+        def edge(x: Array) -> Array:
+            return self._rows(x, self._lifted(x, t), scale)
+
+        spline = polynomial(edge, course, (rows[0], rows[1]))
+        if spline is None:
+            demand = Demand(self.degree, self.tolerance, (*spaces, *places))
+            spline = fit(edge, course, Ends((rows[0], rows[1])), demand).spline
         traces = []
         for b in places:
-            trace = result.spline.part(b)
-            traces.append(type(trace)(trace.degree, trace.knots, trace.poles / [scale, 1.0]))
-        probe = _probe_places(result)
+            trace = spline.part(b)
+            traces.append(replace(trace, poles=trace.poles / [scale, 1.0]))
+        probe = _probe_places(spline)
         x = course(probe)
         span = (float(course.s[0]), float(course.s[-1]))
         return Piece(
             _two(t),
             corners,
-            tuple(result.spline.part(b) for b in spaces),
+            tuple(spline.part(b) for b in spaces),
             (span,) * layers,
             tuple(traces) or (None,) * layers,
             (probe, self._lifted(x, t)),
         )
+
+    def _ellipse(self, t: Array) -> Piece | None:
+        """The edge of a sheet body over t (2,) as an ellipse, if it is one."""
+        samples = np.linspace(t[0], t[1], 65)
+        corners = self._ends(t)
+        points = self.points(samples)[:, 0]
+        points[[0, -1]] = corners[:, 0]
+        skin = None if self.skins is None else self.skins[0]
+        angles = samples if self.chart is None else self.chart.angle(samples)
+        found = ellipse_edge(points, skin, angles)
+        if found is None:
+            return None
+        (curve, span), trace = found
+        return Piece(_two(t), corners, (curve,), (span,), (trace,), self._no_probes())
 
     def _lifted(self, t: Array, ends: Array) -> Array:
         """The edge on every layer, drawn to the mitred corners over the whole piece."""
@@ -321,8 +361,8 @@ def _sweep(arc: Arc, points: Array) -> tuple[float, float]:
     return 0.0, float(u[-1] - u[0])
 
 
-def _probe_places(result: Fit) -> Array:
-    knots = np.unique(result.spline.knots)
+def _probe_places(spline: Spline) -> Array:
+    knots = np.unique(spline.knots)
     return np.asarray((knots[:-1, None] + np.diff(knots)[:, None] * PER_SPAN).ravel())
 
 

@@ -4,7 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 from OCP.BRep import BRep_Builder
-from OCP.collections import Array1_double, Array1_gp_Pnt, Array1_gp_Pnt2d, Array1_int, Array2_gp_Pnt
+from OCP.collections import (
+    Array1_double,
+    Array1_gp_Pnt,
+    Array1_gp_Pnt2d,
+    Array1_int,
+    Array2_double,
+    Array2_gp_Pnt,
+)
 from OCP.Geom import (
     Geom_BSplineCurve,
     Geom_BSplineSurface,
@@ -12,6 +19,7 @@ from OCP.Geom import (
     Geom_ConicalSurface,
     Geom_Curve,
     Geom_CylindricalSurface,
+    Geom_Ellipse,
     Geom_Line,
     Geom_Plane,
     Geom_Surface,
@@ -37,6 +45,7 @@ from devcad.export._step_body import (
     Curve,
     Cylinder,
     Edge,
+    Ellipse,
     Face,
     Line,
     Plane,
@@ -122,12 +131,15 @@ def surface_of(surface: Surface) -> Geom_Surface:
         return Geom_ConicalSurface(place, surface.half_angle, surface.radius)
     low, high = surface.low, surface.high
     poles = Array2_gp_Pnt(1, 2, 1, len(low.poles))
+    weights = Array2_double(1, 2, 1, len(low.poles))
     for row, spline in ((1, low), (2, high)):
         for k, pole in enumerate(spline.poles.tolist()):
             poles.SetValue(row, k + 1, gp_Pnt(*pole))
+        for k, weight in enumerate(_weights(spline)):
+            weights.SetValue(row, k + 1, weight)
     knots, times = _knots(low)
     return Geom_BSplineSurface(
-        poles, _reals([0.0, 1.0]), knots, _ints([2, 2]), times, 1, low.degree
+        poles, weights, _reals([0.0, 1.0]), knots, _ints([2, 2]), times, 1, low.degree
     )
 
 
@@ -140,10 +152,13 @@ def _curve(curve: Curve, start: Array, end: Array) -> Geom_Curve | None:
         return Geom_Circle(
             gp_Ax2(_pnt(curve.centre), _dir(curve.axis), _dir(curve.x)), curve.radius
         )
+    if isinstance(curve, Ellipse):
+        place = gp_Ax2(_pnt(curve.centre), _dir(curve.axis), _dir(curve.x))
+        return Geom_Ellipse(place, curve.major, curve.minor)
     poles = Array1_gp_Pnt(1, len(curve.poles))
     for k, pole in enumerate(curve.poles.tolist()):
         poles.SetValue(k + 1, gp_Pnt(*pole))
-    return Geom_BSplineCurve(poles, *_knots(curve), curve.degree)
+    return Geom_BSplineCurve(poles, _reals(_weights(curve)), *_knots(curve), curve.degree)
 
 
 def _curve2d(trace: Trace, span: tuple[float, float]) -> Geom2d_Curve:
@@ -162,6 +177,13 @@ def _knots(spline: Spline) -> tuple[Array1_double, Array1_int]:
     """Distinct knots and their multiplicities."""
     values, times = np.unique(spline.knots, return_counts=True)
     return _reals(values.tolist()), _ints(times.tolist())
+
+
+def _weights(spline: Spline) -> list[float]:
+    """The weights of a spline's poles; the kernel drops those that are all 1."""
+    if spline.weights is None:
+        return [1.0] * len(spline.poles)
+    return [float(w) for w in spline.weights[:, 0]]
 
 
 def _reals(values: list[float]) -> Array1_double:

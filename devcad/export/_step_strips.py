@@ -15,6 +15,7 @@ import numpy as np
 from devcad.errors import GeometryError
 from devcad.geometry import taylor
 from devcad.geometry.classify import Shape, classify
+from devcad.geometry.conic import arc_borders
 from devcad.geometry.fit import FLOOR, Course
 from devcad.geometry.patch import Patch
 from devcad.geometry.taylor import Array
@@ -159,8 +160,9 @@ def _speed_ratio(
 ) -> float | None:
     """|slope after| / |slope before| at a break, or None where their directions differ."""
     step = 1e-5 * min(at - before, after - at)
-    near = slopes(at + step * np.array([-2.0, -1.0, 1.0, 2.0]))
-    left, right = 2.0 * near[1] - near[0], 2.0 * near[2] - near[3]  # error of second order
+    near = slopes(at + step * np.array([-1.0, -2.0, -3.0, 1.0, 2.0, 3.0]))
+    carry = np.array([3.0, -3.0, 1.0])  # error of third order: the ratio is good to rounding
+    left, right = carry @ near[:3], carry @ near[3:]
     sizes = float(np.linalg.norm(left)), float(np.linalg.norm(right))
     if min(sizes) == 0.0:
         return None
@@ -202,47 +204,73 @@ def _pieces(whole: Strip, alone: bool) -> list[tuple[Shape, Course]]:
     if whole.shape.analytic:
         cuts = _analytic_cuts(whole, alone)
         return [(whole.shape, _plain(_within(segments, a, b))) for a, b in pairwise(cuts)]
-    runs = _runs(whole)
+    runs = [part for run in _runs(whole) for part in _arcs_apart(whole, run)]
     pieces = _smooth_pieces(whole, runs, [])
     if alone and len(pieces) < FITTED_PARTS:
         pieces = _smooth_pieces(whole, runs, _quarters(whole))
     return pieces
 
 
-def _runs(whole: Strip) -> list[tuple[Shape, Array]]:
+@dataclass(frozen=True, slots=True)
+class _Run:
+    """A stretch of a patch with its borders; ``exact`` where it is one face as it stands."""
+
+    shape: Shape
+    borders: Array
+    exact: bool
+
+
+def _runs(whole: Strip) -> list[_Run]:
     """Stretches of a general patch between breaks that are planes, circular cylinders or right
     circular cones for themselves (the sides and corners of a rounded box), and those that are
     not, each with its borders."""
     patch, segments = whole.patch, whole.patch.segments
     if not 0 < len(patch.breaks) <= MOST_BREAKS:
-        return [(whole.shape, segments)]
-    runs: list[tuple[Shape, Array]] = []
+        return [_Run(whole.shape, segments, False)]
+    runs: list[_Run] = []
     for a, b in pairwise(segments):
         shape = classify(patch.restricted(a, b))
         shape = shape if shape.analytic else whole.shape
-        if runs and runs[-1][0].analytic == shape.analytic:
-            joined = np.append(runs[-1][1], b)
+        if runs and runs[-1].exact == shape.analytic:
+            joined = np.append(runs[-1].borders, b)
             both = classify(patch.restricted(joined[0], b)) if shape.analytic else shape
             if both.analytic == shape.analytic:
-                runs[-1] = (both, joined)
+                runs[-1] = _Run(both, joined, shape.analytic)
                 continue
-        runs.append((shape, np.array([a, b])))
+        runs.append(_Run(shape, np.array([a, b]), shape.analytic))
     return runs
 
 
-def _smooth_pieces(
-    whole: Strip, runs: list[tuple[Shape, Array]], cuts: list[float]
-) -> list[tuple[Shape, Course]]:
+def _arcs_apart(whole: Strip, run: _Run) -> list[_Run]:
+    """A run of a sheet body, every part of it between breaks that is a surface between arcs of
+    conics for itself: one face for each quarter turn, for knots with a kink in the weights would
+    make the face C0 to the kernels."""
+    if run.exact or len(whole.layers) > 1 or len(run.borders) > MOST_BREAKS + 2:
+        return [run]
+    out: list[_Run] = []
+    for a, b in pairwise(run.borders):
+        found = arc_borders(lambda t: _flat(whole.rails(t)), a, b)
+        if found is not None:
+            out += [_Run(run.shape, np.array(part), True) for part in pairwise(found)]
+        elif out and not out[-1].exact:
+            out[-1] = _Run(run.shape, np.append(out[-1].borders, b), False)
+        else:
+            out.append(_Run(run.shape, np.array([a, b]), False))
+    return out
+
+
+def _smooth_pieces(whole: Strip, runs: list[_Run], cuts: list[float]) -> list[tuple[Shape, Course]]:
     """The runs, the fitted ones cut at ``cuts`` and wherever they are not C1."""
     out: list[tuple[Shape, Course]] = []
-    for shape, borders in runs:
-        if shape.analytic:
-            out.append((shape, _plain(borders)))
+    for run in runs:
+        borders = run.borders
+        if run.exact:
+            out.append((run.shape, _plain(borders)))
             continue
         inner = [c for c in cuts if borders[0] < c < borders[-1]]
         places = np.array([borders[0], *inner, borders[-1]])
         courses = smooth_courses(lambda t: _flat(whole.slopes(t)), borders, places)
-        out += [(shape, course) for course in courses]
+        out += [(run.shape, course) for course in courses]
     return out
 
 

@@ -2,10 +2,11 @@
 
 The coordinates are the pattern's own. The outer contour is one closed LWPOLYLINE with bulges
 (R12: POLYLINE), counterclockwise; a hole is a CIRCLE if it is one, else a closed LWPOLYLINE,
-clockwise; reference lines are LINEs. With ``curves = "spline"`` a contour is instead a chain of
-SPLINE, LINE and ARC entities in the order of the run: the end of each LINE and SPLINE is the
-start of the next to the last digit, an ARC meets its neighbours to rounding (its ends follow
-from centre, radius and angles), and the last meets the first.
+clockwise; reference lines are LINEs; a drawing on the sheet is a LINE, an ARC or an open
+LWPOLYLINE. With ``curves = "spline"`` a contour is instead a chain of SPLINE, LINE and ARC
+entities in the order of the run: the end of each LINE and SPLINE is the start of the next to the
+last digit, an ARC meets its neighbours to rounding (its ends follow from centre, radius and
+angles), and the last meets the first; so is a drawing, but for its ends.
 """
 
 from __future__ import annotations
@@ -29,6 +30,7 @@ from devcad.checks import Check, at_most
 from devcad.errors import JobError
 from devcad.export import Options, Written
 from devcad.export.binary import demanded, opened, torn
+from devcad.export.dxfdrawings import add_drawings, drawings_deviation
 from devcad.export.dxfsplines import add_chains, chain_deviation, circle_loop
 from devcad.export.outline import Contours, contours, drawing_path, measured
 from devcad.flatten import loops
@@ -102,6 +104,7 @@ def _write_panel(part: Part, panel: Panel, folder: Path, options: Options) -> Wr
         document = _document(ezdxf, options.dxf_version)
         space = document.modelspace()
         _add_lines(space, panel)
+        add_drawings(space, panel, limit, options.dxf_curves, _style)
         spline = options.dxf_curves == "spline"
         if spline:
             _add_splines(space, panel, limit)
@@ -118,6 +121,8 @@ def _write_panel(part: Part, panel: Panel, folder: Path, options: Options) -> Wr
         found = chain_deviation(read.modelspace(), panel, (OUTER, INNER), limit, path)
     else:
         found = measured(_contours(read, panel, path, exact), panel, limit, path, READBACK)
+    drawn = drawings_deviation(read.modelspace(), panel, limit, path, splines=spline)
+    found = max(found, drawn)
     checks = demanded([_deviation_check(panel, found, limit)], path)
     return Written(path, "dxf", found, checks)
 

@@ -14,13 +14,15 @@ from devcad.flatten.loops import Loop, Path
 from devcad.flatten.measure import loop_deviation
 from devcad.flatten.pattern import Edge
 from devcad.flatten.splines2d import Spline, spline_deviation
-from devcad.flatten.trace import evaluate
+from devcad.flatten.trace import Trace, evaluate
 from devcad.geometry.taylor import Array
 from devcad.part import Panel
 
 JOINED = 1e-9  # mm per mm of the pattern's size: how far apart neighbouring ends may be
 
 Chain = tuple["Path | Spline", ...]
+Ends = tuple[Array, Array]
+"""Start and end (2,) of an entity."""
 
 
 def add_chains(space: Any, chains: tuple[Chain, ...], style: dict[str, Any]) -> None:
@@ -81,21 +83,36 @@ def _contour_deviation(
     traces, _ = traced_edges(edges, limit)
     size = max(traced.size for traced in traces)
     worst = 0.0
-    ends: list[tuple[Array, Array]] = []
+    ends: list[Ends] = []
     for traced in traces:
-        for i, j, exact in pieces(traced):
-            u = _dense(traced.u[i : j + 1])
-            points, _ = evaluate(traced.edge, u)
-            for part in np.array_split(points, 1 if exact is None else len(exact.bulges)):
-                if not entities:
-                    raise torn("dxf-readback", path, "entities are missing", panel=panel)
-                entity = entities.pop(0)
-                worst = max(worst, _entity_deviation(entity, part))
-                ends.append(_ends(entity, ends[-1][1] if ends else part[0]))
+        found, chain = edge_deviation(entities, traced, panel, path)
+        worst, ends = max(worst, found), ends + chain
     for (_, a), (b, _) in zip(ends, ends[1:] + ends[:1], strict=True):
         if np.hypot(*(a - b)) > JOINED * size:
             raise torn("dxf-readback", path, "a contour is not closed", panel=panel)
     return worst
+
+
+def edge_deviation(
+    entities: list[Any], traced: Trace, panel: str, path: FilePath
+) -> tuple[float, list[Ends]]:
+    """The deviation of one edge's entities, taken from the front of the list, and their ends in
+    the order of the run.
+
+    Raises:
+        CheckFailed: dxf-readback, when entities are missing.
+    """
+    worst = 0.0
+    ends: list[Ends] = []
+    for i, j, exact in pieces(traced):
+        points, _ = evaluate(traced.edge, _dense(traced.u[i : j + 1]))
+        for part in np.array_split(points, 1 if exact is None else len(exact.bulges)):
+            if not entities:
+                raise torn("dxf-readback", path, "entities are missing", panel=panel)
+            entity = entities.pop(0)
+            worst = max(worst, _entity_deviation(entity, part))
+            ends.append(_ends(entity, ends[-1][1] if ends else part[0]))
+    return worst, ends
 
 
 def _dense(u: Array) -> Array:

@@ -1,4 +1,4 @@
-"""A folder that appears at once: all its files together by one rename, or not at all."""
+"""A folder or a file that appears at once: complete, by one rename, or not at all."""
 
 from __future__ import annotations
 
@@ -54,6 +54,37 @@ def published(out: Path, name: str) -> Iterator[Path]:
     finally:
         if fresh and not done:
             with suppress(OSError):
+                out.rmdir()
+
+
+def publish_file(out: Path, name: str, data: bytes) -> Path:
+    """Write OUT/name, whole or not at all, in place of an earlier one; returns its path.
+
+    Raises:
+        FileError: OUT cannot be written.
+    """
+    target, part = out / name, out / f".{name}-{secrets.token_hex(8)}.part"
+    fresh = done = False
+    try:
+        _refuse_file_in_the_way(out)
+        fresh = not out.exists()
+        out.mkdir(parents=True, exist_ok=True)
+        with part.open("xb") as stream:
+            stream.write(data)
+            stream.flush()
+            os.fsync(stream.fileno())
+        part.replace(target)
+        _synchronise_entries(out)
+        done = True
+        return target
+    except DevcadError:
+        raise
+    except OSError as error:
+        raise unwritable(out, error, name) from error
+    finally:
+        with suppress(OSError):
+            part.unlink(missing_ok=True)
+            if fresh and not done:
                 out.rmdir()
 
 

@@ -3,24 +3,27 @@ what was read back is the pattern."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import Path as FilePath
 
 from devcad.errors import JobError
 from devcad.export import panel_path
 from devcad.export.binary import torn
 from devcad.flatten import loops
-from devcad.flatten.arcs import fit_outline
-from devcad.flatten.loops import Loop
-from devcad.flatten.measure import loop_deviation
-from devcad.flatten.pattern import Pattern
-from devcad.flatten.polylines import polyline_outline
+from devcad.flatten.arcs import fit_edge, fit_outline
+from devcad.flatten.loops import Loop, Path
+from devcad.flatten.measure import deviation, loop_deviation
+from devcad.flatten.pattern import Edge, Pattern
+from devcad.flatten.polylines import polyline_edge, polyline_outline
+from devcad.flatten.trace import trace
 from devcad.part import Panel, Part
 
 EXACT = 1e-9  # of the pattern's size: below it a recognised line or arc counts as exact
 ROUNDING = 1e-11  # of the pattern's size: the accuracy of its outline, 1e-9 mm per 100 mm
 
 FITS = {"arcs": fit_outline, "polyline": polyline_outline}
+EDGE_FITS: dict[str, Callable[[Edge, float], Path]] = {"arcs": fit_edge, "polyline": polyline_edge}
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,19 +58,38 @@ def contours(pattern: Pattern, tolerance: float, curves: str) -> Contours:
     return Contours(fit(pattern.outline, tolerance), holes)
 
 
-def drawing_path(part: Part, panel: Panel, folder: Path, suffix: str, mark: str = "") -> Path:
-    """The path of a panel's drawing: -approximate where the twist check was allowed to fail,
-    then ``mark``, then the suffix."""
+def strokes(pattern: Pattern, tolerance: float, curves: str) -> tuple[Path, ...]:
+    """The drawings of a pattern as open paths of lines and arcs, or of straight segments, within
+    ``tolerance`` (mm), in order; ``curves`` as in :func:`contours`."""
+    return tuple(EDGE_FITS[curves](edge, tolerance) for edge in pattern.drawings)
+
+
+def drawing_path(
+    part: Part, panel: Panel, folder: FilePath, suffix: str, mark: str = ""
+) -> FilePath:
+    """The path of a panel's drawing: -approximate where the surface twists and the pattern is no
+    isometric one, then ``mark``, then the suffix."""
     path = panel_path(part, panel.name, folder, suffix)
     twisted = any(
-        check.name == "twist" and not check.passed and check.panel in ("", panel.name)
+        check.name in ("twist", "isometry") and not check.passed and check.panel in ("", panel.name)
         for check in part.checks
     )
     stem = path.name.removesuffix(f".{suffix}")
     return path.with_name(f"{stem}{'-approximate' if twisted else ''}{mark}.{suffix}")
 
 
-def measured(read: Contours, panel: Panel, limit: float, path: Path, name: str) -> float:
+def strokes_deviation(read: Sequence[Path], pattern: Pattern, limit: float) -> float:
+    """The largest distance in mm between the drawings that were read, each in the direction of
+    its curve, and the true ones; what is below 1e-9 of the pattern's size counts as 0."""
+    size = longer_side(pattern)
+    worst = 0.0
+    for path, edge in zip(read, pattern.drawings, strict=True):
+        found = deviation(trace(edge, limit / 5.0), path.points, path.bulges)
+        worst = max(worst, 0.0 if found <= EXACT * size else found)
+    return worst
+
+
+def measured(read: Contours, panel: Panel, limit: float, path: FilePath, name: str) -> float:
     """The largest distance in mm between the cuts that were read and the true pattern, 0 where
     every segment is recognised as exact (``read.exact`` is the claim; it is tested here).
 
@@ -87,13 +109,18 @@ def measured(read: Contours, panel: Panel, limit: float, path: Path, name: str) 
             raise torn(name, path, fault, panel=panel.name)
     area = sum(loops.area(loop) for loop, _ in pairs)
     border = sum(loops.perimeter(loop) for loop, _ in pairs)
-    x0, y0, x1, y1 = pattern.bbox
-    size = max(x1 - x0, y1 - y0)
+    size = longer_side(pattern)
     slack = (found + ROUNDING * size) * border + EXACT * pattern.area
     if abs(area - pattern.area) > slack:
         what = f"an area of {area:.12g} mm2 was read, the pattern has {pattern.area:.12g}"
         raise torn(name, path, what, panel=panel.name)
     return 0.0 if read.exact and found <= EXACT * size else found
+
+
+def longer_side(pattern: Pattern) -> float:
+    """The longer side of the pattern's box, mm."""
+    x0, y0, x1, y1 = pattern.bbox
+    return max(x1 - x0, y1 - y0)
 
 
 def _fault(loop: Loop, *, outer: bool) -> str:

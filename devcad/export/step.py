@@ -1,7 +1,8 @@
 """STEP: exact faces where they exist, fitted ruled faces elsewhere, solids and sheet bodies.
 
 Planes, circular cylinders and right circular cones become what they are, with lines and circles;
-every other smooth patch becomes one B-spline face, straight along its rulings. All is measured
+every other smooth patch becomes B-spline faces, straight along their rulings: the surface itself
+where its edges are polynomials or, without thickness, arcs of conics, else a fit. All is measured
 again on the file as a fresh reader sees it.
 """
 

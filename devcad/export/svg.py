@@ -9,7 +9,7 @@ stroke colour as laser programs do, and inner cuts stand before the outer one.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from pathlib import Path
+from pathlib import Path as FilePath
 from xml.etree import ElementTree
 from xml.sax.saxutils import escape, quoteattr
 
@@ -18,17 +18,30 @@ import numpy as np
 from devcad.checks import at_most
 from devcad.export import Options, Written
 from devcad.export.binary import demanded, opened, torn
-from devcad.export.outline import Contours, contours, drawing_path, measured
-from devcad.flatten import loops
-from devcad.flatten.loops import Loop
+from devcad.export.outline import (
+    Contours,
+    contours,
+    drawing_path,
+    measured,
+    strokes,
+    strokes_deviation,
+)
+from devcad.export.svgpaths import (
+    NAMESPACE,
+    closed_path,
+    number,
+    open_path,
+    read_closed,
+    read_open,
+    straight_path,
+)
+from devcad.flatten.loops import Path
 from devcad.geometry.taylor import Array
 from devcad.part import Panel, Part
 
 READBACK = "svg-readback"
-NAMESPACE = "http://www.w3.org/2000/svg"
 MARGIN = 1.0  # mm around the pattern, so that strokes on its border are seen whole
 STROKE = 0.1  # mm
-QUARTER = 0.5 * np.pi  # rad; an SVG arc is centred by its radius, ill-conditioned near a half turn
 SHARE = 0.1  # of the part's tolerance goes into the drawing
 OUTER, INNER = "CUT_OUTER", "CUT_INNER"
 COLOURS = {  # in the order of the file
@@ -51,12 +64,13 @@ def svg_origin(panel: Panel) -> tuple[float, float]:
     return float(xmin) - MARGIN, float(ymax) + MARGIN
 
 
-def write(part: Part, folder: Path, options: Options) -> list[Written]:
+def write(part: Part, folder: FilePath, options: Options) -> list[Written]:
     """One SVG for each panel, written, read back and measured against the pattern's true
     curves.
 
-    Contours are lines and arcs within a tenth of the part's tolerance, straight segments where
-    ``options.dxf_curves`` says polyline (SVG has no B-splines: spline means arcs here).
+    Contours and drawings are lines and arcs within a tenth of the part's tolerance, straight
+    segments where ``options.dxf_curves`` says polyline (SVG has no B-splines: spline means arcs
+    here).
 
     Raises:
         CheckFailed: svg-deviation or svg-readback.
@@ -65,16 +79,21 @@ def write(part: Part, folder: Path, options: Options) -> list[Written]:
     return [_write_panel(part, panel, folder, options) for panel in part.panels]
 
 
-def _write_panel(part: Part, panel: Panel, folder: Path, options: Options) -> Written:
+def _write_panel(part: Part, panel: Panel, folder: FilePath, options: Options) -> Written:
     path = drawing_path(part, panel, folder, "svg")
     limit = SHARE * part.tolerance
     curves = "arcs" if options.dxf_curves == "spline" else options.dxf_curves
     cuts = contours(panel.pattern, limit, curves)
+    drawn = strokes(panel.pattern, limit, curves)
     name = part.name if len(part.panels) == 1 else f"{part.name} {panel.name}"
-    text = "\n".join(_document(name, panel, cuts))
+    text = "\n".join(_document(name, panel, cuts, drawn))
     with opened(path, "wb") as stream:
         stream.write(f"{text}\n".encode("ascii"))
-    found = measured(_read(path, panel, cuts.exact), panel, limit, path, READBACK)
+    read, strokes_read = _read(path, panel, cuts.exact)
+    found = max(
+        measured(read, panel, limit, path, READBACK),
+        strokes_deviation(strokes_read, panel.pattern, limit),
+    )
     check = at_most(
         "svg-deviation",
         panel.name,
@@ -87,11 +106,11 @@ def _write_panel(part: Part, panel: Panel, folder: Path, options: Options) -> Wr
     return Written(path, "svg", found, demanded([check], path))
 
 
-def _document(name: str, panel: Panel, cuts: Contours) -> Iterator[str]:
+def _document(name: str, panel: Panel, cuts: Contours, drawn: tuple[Path, ...]) -> Iterator[str]:
     """The lines of the file."""
     xmin, ymin, xmax, ymax = panel.pattern.bbox
-    width = _number(xmax - xmin + 2.0 * MARGIN)
-    height = _number(ymax - ymin + 2.0 * MARGIN)
+    width = number(xmax - xmin + 2.0 * MARGIN)
+    height = number(ymax - ymin + 2.0 * MARGIN)
     origin = np.array(svg_origin(panel))
     title = escape(name.encode("ascii", "backslashreplace").decode("ascii"))
     yield '<?xml version="1.0" encoding="UTF-8"?>'
@@ -101,7 +120,7 @@ def _document(name: str, panel: Panel, cuts: Contours) -> Iterator[str]:
     )
     yield f"<title>{title}</title>"
     for layer, colour in COLOURS.items():
-        paths = _paths(panel, cuts, origin, layer)
+        paths = _paths(panel, cuts, drawn, origin, layer)
         if paths:
             dashes = f' stroke-dasharray="{DASHES[layer]}"' if layer in DASHES else ""
             yield (
@@ -113,50 +132,22 @@ def _document(name: str, panel: Panel, cuts: Contours) -> Iterator[str]:
     yield "</svg>"
 
 
-def _paths(panel: Panel, cuts: Contours, origin: Array, layer: str) -> list[str]:
-    """The path data of a layer."""
+def _paths(
+    panel: Panel, cuts: Contours, drawn: tuple[Path, ...], origin: Array, layer: str
+) -> list[str]:
+    """The path data of a layer: contours, or its reference lines and behind them its drawings."""
     if layer == OUTER:
-        return [_contour(cuts.outer, origin)]
+        return [closed_path(cuts.outer, origin)]
     if layer == INNER:
-        return [_contour(hole, origin) for hole in cuts.holes]
-    return [
-        f"M{_point(line.start, origin)} L{_point(line.end, origin)}"
-        for line in panel.pattern.lines
-        if line.layer == layer
-    ]
+        return [closed_path(hole, origin) for hole in cuts.holes]
+    pattern = panel.pattern
+    lines = [straight_path(a.start, a.end, origin) for a in pattern.lines if a.layer == layer]
+    edges = zip(pattern.drawings, drawn, strict=True)
+    return [*lines, *(open_path(path, origin) for edge, path in edges if edge.name == layer)]
 
 
-def _contour(loop: Loop, origin: Array) -> str:
-    """A closed contour: M, then L or A for every segment, Z."""
-    out = [f"M{_point(loop.points[0], origin)}"]
-    for start, end, bulge in zip(loop.points, loop.ends, loop.bulges.tolist(), strict=True):
-        if bulge == 0.0:
-            out.append(f"L{_point(end, origin)}")
-            continue
-        half = 2.0 * np.arctan(bulge)
-        parts = int(np.ceil(2.0 * abs(half) / QUARTER - 1e-9))
-        inner, part_bulge = loops.split(start, bulge, end, parts)
-        stops = np.concatenate([start[None], inner, end[None]])
-        sine = abs(np.sin(2.0 * np.arctan(part_bulge)))
-        radius = float(np.hypot(*(stops[1] - stops[0])) / (2.0 * sine))
-        flag = int(bulge < 0.0)  # y points down: counterclockwise is the negative sense
-        out += [f"A{radius!r} {radius!r} 0 0 {flag} {_point(p, origin)}" for p in stops[1:]]
-    return " ".join([*out, "Z"])
-
-
-def _point(point: Array, origin: Array) -> str:
-    """A pattern point in the drawing's coordinates."""
-    return f"{_number(point[0] - origin[0])} {_number(origin[1] - point[1])}"
-
-
-def _number(x: float) -> str:
-    """mm to 1e-10, without an exponent (which some readers do not know)."""
-    text = f"{x:.10f}".rstrip("0").rstrip(".")
-    return "0" if text == "-0" else text
-
-
-def _read(path: Path, panel: Panel, exact: bool) -> Contours:
-    """The contours of a file as it was read, back in pattern coordinates.
+def _read(path: FilePath, panel: Panel, exact: bool) -> tuple[Contours, list[Path]]:
+    """The contours and the drawings of a file as it was read, back in pattern coordinates.
 
     Raises:
         CheckFailed: it is not the drawing that was written.
@@ -165,35 +156,31 @@ def _read(path: Path, panel: Panel, exact: bool) -> Contours:
         with opened(path, "rb") as stream:
             root = ElementTree.fromstring(stream.read())
         found = {
-            group.get("id"): [_loop(p.get("d", ""), panel, exact) for p in group]
+            group.get("id", ""): [p.get("d", "") for p in group]
             for group in root.iter(f"{{{NAMESPACE}}}g")
-            if group.get("id") in (OUTER, INNER)
         }
-        (outer,) = found[OUTER]
+        origin = svg_origin(panel)
+        (outer,) = [read_closed(data, origin, exact=exact) for data in found[OUTER]]
+        holes = [read_closed(data, origin, exact=exact) for data in found.get(INNER, [])]
+        drawn = [read_open(data, origin) for data in _drawings(found, panel)]
     except (ElementTree.ParseError, KeyError, ValueError, IndexError) as error:
         raise torn(READBACK, path, f"not readable: {error}", panel=panel.name) from error
-    return Contours(outer, tuple(found.get(INNER, [])))
+    return Contours(outer, tuple(holes)), drawn
 
 
-def _loop(data: str, panel: Panel, exact: bool) -> Loop:
-    """Closed path data as a loop in pattern coordinates."""
-    words = data.split()
-    if words[-1] != "Z":
-        raise ValueError("a contour is open")
-    points, bulges = [[float(words[0][1:]), float(words[1])]], []
-    k = 2
-    while words[k] != "Z":
-        step = 7 if words[k][0] == "A" else 2
-        end = [float(words[k + step - 2].lstrip("L")), float(words[k + step - 1])]
-        bulges.append(0.0)
-        if step == 7:
-            chord = np.hypot(end[0] - points[-1][0], end[1] - points[-1][1])
-            half = np.arcsin(min(1.0, chord / (2.0 * float(words[k][1:]))))
-            bulges[-1] = float(np.tan(0.5 * half)) * (1.0 if words[k + 4] == "0" else -1.0)
-        points.append(end)
-        k += step
-    if points[-1] != points[0]:
-        raise ValueError("a contour does not end where it starts")
-    x0, y0 = svg_origin(panel)
-    xy = np.array(points[:-1])
-    return Loop(np.stack([x0 + xy[:, 0], y0 - xy[:, 1]], axis=1), np.array(bulges), exact)
+def _drawings(found: dict[str, list[str]], panel: Panel) -> list[str]:
+    """The path data of the pattern's drawings, in its order.
+
+    Raises:
+        ValueError: there are more or fewer than it has.
+    """
+    pattern = panel.pattern
+    left = {
+        layer: iter(data[sum(line.layer == layer for line in pattern.lines) :])
+        for layer, data in found.items()
+        if layer not in (OUTER, INNER)
+    }
+    drawn = [next(left.get(edge.name, iter(())), "") for edge in pattern.drawings]
+    if not all(drawn) or any(next(rest, "") for rest in left.values()):
+        raise ValueError("drawings are missing, or there are too many")
+    return drawn

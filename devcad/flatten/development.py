@@ -37,6 +37,11 @@ class Development:
         at = self.series(t)
         return at[:, 1:3], _direction(at[:, 0])
 
+    def axes(self, t: Array) -> tuple[Array, Array, Array]:
+        """The images of c0(t), e(t) and m(t), each (n, 2)."""
+        origin, e = self.rulings(t)
+        return origin, e, np.column_stack([-e[:, 1], e[:, 0]])
+
     def points(self, t: Array, v: Array) -> Array:
         """The images of the surface points (t, v), each (n,), shape (n, 2)."""
         origin, direction = self.rulings(t)

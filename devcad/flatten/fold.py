@@ -61,8 +61,11 @@ def fold(development: Development, start: Array, bend: float) -> Folded:
     ``bend`` scales the bending c: 0 stays flat, 1 is the part. Reads the pattern and c only.
     """
     knots = _panels(development, bend)
+    # rotations and lengths stand in one matrix: in units of the pattern's size both are about 1
+    unit = float(np.abs(development.origin(knots)).max())
+    unit = max(unit, float(np.abs(start[:, 3]).max())) or 1.0  # 0 at a cone's apex
     for _ in range(ROUNDS):
-        flow = _flow(development, knots, bend)
+        flow = _flow(development, knots, bend, unit)
         coefficients = np.abs(np.einsum("kj,pjab->pkab", chebyshev.transform(NODES), flow))
         rough = coefficients[:, -2:].max(axis=(1, 2)) > RESOLVED * coefficients.max(axis=(1, 2))
         if not rough.any():
@@ -70,21 +73,22 @@ def fold(development: Development, start: Array, bend: float) -> Folded:
         split = rough.any(axis=1)
         knots = np.sort(np.concatenate([knots, 0.5 * (knots[:-1] + knots[1:])[split]]))
     motions = np.empty((len(flow), NODES, 12))
-    current = start
+    current = start / [1.0, 1.0, 1.0, unit]
     for panel, steps in enumerate(flow):
         motions[panel] = (current @ steps).reshape(NODES, 12)
         current = _orthonormal(motions[panel, -1].reshape(3, 4))
+    motions[..., 3::4] *= unit
     table = np.einsum("kj,pjd->pkd", chebyshev.transform(NODES), motions)
     return Folded(development, Piecewise(knots, table))
 
 
-def _flow(development: Development, knots: Array, bend: float) -> Array:
-    """Each panel's motion from its start to its nodes, (k, NODES, 4, 4)."""
+def _flow(development: Development, knots: Array, bend: float, unit: float) -> Array:
+    """Each panel's motion from its start to its nodes, (k, NODES, 4, 4), lengths in ``unit``."""
     low, high = knots[:-1], knots[1:]
     t = np.stack(
         [chebyshev.nodes(a, b, NODES) for a, b in zip(low.tolist(), high.tolist(), strict=True)]
     )
-    generator = _generator(development, t.ravel(), bend).reshape(len(low), NODES, 4, 4)
+    generator = _generator(development, t.ravel(), bend, unit).reshape(len(low), NODES, 4, 4)
     weights = 0.5 * (high - low)[:, None, None] * chebyshev.integration_of_values(NODES)
     # row i of R at node k: r_k = r_0 + sum_j w_kj r_j B_j, the same matrix for the three rows
     system = -np.einsum("pkj,pjab->pkbja", weights, generator)
@@ -131,9 +135,10 @@ def _panels(development: Development, bend: float) -> Array:
     )
 
 
-def _generator(development: Development, t: Array, bend: float) -> Array:
+def _generator(development: Development, t: Array, bend: float, unit: float) -> Array:
     """The rotation at rate bend * c about the ruling's line, as (n, 4, 4) matrices."""
     omega, x, y, c = development.series(t).T
+    x, y = x / unit, y / unit
     rate = bend * c
     u, w = rate * np.cos(omega), rate * np.sin(omega)
     out = np.zeros((len(t), 4, 4))

@@ -46,6 +46,8 @@ class Loop:
         return np.roll(self.points, -1, axis=0)
 
 
+FULL = 2.0 * np.pi - 2e-9
+"""Arcs that sweep as much are full circles, radians."""
 SPIKE = 0.3
 """A corner within this of a half turn, in radians, is a spike."""
 
@@ -128,20 +130,39 @@ def counterclockwise(loop: Loop) -> Loop:
 
 def circle(loop: Loop) -> tuple[Array, float] | None:
     """Centre (2,) and radius when the loop is one full circle of exact arcs, else None."""
-    if not loop.exact or np.any(loop.bulges == 0.0):
+    around = Path(np.concatenate([loop.points, loop.points[:1]]), loop.bulges, loop.exact, 0.0)
+    found = arc(around)
+    return None if found is None or abs(found[3]) < FULL else found[:2]
+
+
+def arc(path: Path) -> tuple[Array, float, float, float] | None:
+    """Centre (2,), radius, first angle and sweep (radians, positive counterclockwise) when the
+    path is one exact arc or one full circle, else None."""
+    if not path.exact or np.any(path.bulges == 0.0):
         return None
-    half = half_sweeps(loop.bulges)
-    chord = loop.ends - loop.points
+    half = half_sweeps(path.bulges)
+    starts, ends = path.points[:-1], path.points[1:]
+    chord = ends - starts
     normal = np.stack([-chord[:, 1], chord[:, 0]], axis=1)
-    centres = 0.5 * (loop.points + loop.ends) + 0.5 * normal / np.tan(half)[:, None]
+    centres = 0.5 * (starts + ends) + 0.5 * normal / np.tan(half)[:, None]
     centre = centres.mean(axis=0)
-    radius = float(np.hypot(*(loop.points - centre).T).mean())
-    spread = max(
-        float(np.abs(np.hypot(*(loop.points - centre).T) - radius).max()),
-        float(np.abs(centres - centre).max()),
-    )
-    whole = abs(abs(half.sum()) - np.pi) < 1e-9
-    return (centre, radius) if whole and spread <= 1e-9 * radius else None
+    arms = path.points - centre
+    radii = np.hypot(*arms.T)
+    radius = float(radii.mean())
+    spread = max(float(np.abs(radii - radius).max()), float(np.abs(centres - centre).max()))
+    sweep = float(2.0 * half.sum())
+    turns_back = np.any(half * half[0] < 0.0) or abs(sweep) > 2.0 * np.pi + 1e-9
+    if turns_back or spread > 1e-9 * radius:
+        return None
+    return centre, radius, float(np.arctan2(arms[0, 1], arms[0, 0])), sweep
+
+
+def arc_path(centre: Array, radius: float, start: float, sweep: float) -> Path:
+    """An arc as an exact path of segments of at most half a turn."""
+    parts = int(np.ceil(abs(sweep) / np.pi - 1e-9))
+    at = start + sweep * np.arange(parts + 1) / parts
+    bulges = np.full(parts, np.tan(0.25 * sweep / parts))
+    return Path(centre + radius * direction(at), bulges, True, 0.0)
 
 
 def segment_distance(starts: Array, ends: Array, bulges: Array, points: Array) -> Array:

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from devcad.flatten.development import Development
-from devcad.flatten.pattern import Edge, Line, Pattern, PlaneCurve
+from devcad.flatten.drawings import draw, not_repeated
+from devcad.flatten.edges import DROPPED
+from devcad.flatten.pattern import Edge, Line, Pattern, PlaneCurve, Unrolled
 from devcad.geometry import chebyshev
 from devcad.geometry.chain import Chain
+from devcad.geometry.drawing import Drawing
 from devcad.geometry.patch import Frame, Patch
 from devcad.geometry.taylor import Array
 
+Pairs = Sequence[tuple[Patch, Unrolled]]
+"""The patches of a chain in order, each with its place in the plane."""
 PlaneDensity = Callable[[Array, Array], Array]
 """Points (n, 2) and derivatives (n, 2) -> densities (n,)."""
 COLLAPSED = 1e-12
@@ -28,16 +32,31 @@ TURN_STEPS = 8
 
 
 def lay_out(
-    chain: Chain, developments: tuple[Development, ...], rulings: tuple[Array, ...]
+    chain: Chain,
+    developments: Sequence[Unrolled],
+    rulings: tuple[Array, ...],
+    drawings: tuple[Drawing, ...] = (),
 ) -> Pattern:
     """The pattern of a chain, its front towards the viewer, counterclockwise.
 
-    The outline runs along the first ruling, up the top edges, back along the last ruling and
-    down the base edges. The area is the surface's own (quadrature of q + v a), the box is found
-    to rounding. Reference lines: joints (rulings where smooth, bends where creased) and certified
-    rulings about every 15 degrees of bending.
+    The area is the surface's own (quadrature of q + v a), the box is found to rounding.
+    Reference lines: joints (rulings where smooth, bends where creased) and certified rulings
+    about every 15 degrees of bending. Drawings are those on the sheet, without what is a point.
     """
     pairs = list(zip(chain.patches, developments, strict=True))
+    outline = border(pairs)
+    box = bounds(outline)
+    least = DROPPED * float(np.hypot(box[2] - box[0], box[3] - box[1]))
+    drawn = [edge for each in drawings for edge in draw(each, *pairs[each.patch])]
+    kept = tuple(edge for edge in drawn if _length_bound(edge) > least)
+    lines = not_repeated(reference_lines(chain, pairs, rulings), kept, least)
+    area = sum(surface_area(patch) for patch in chain.patches)
+    return Pattern(outline, lines, area, box, drawings=kept)
+
+
+def border(pairs: Pairs) -> tuple[Edge, ...]:
+    """The outline of a chain in the plane: along the first ruling, up the top edges, back along
+    the last ruling and down the base edges. Edges that are a point are left out."""
     first, last = pairs[0], pairs[-1]
     edges = [
         _ruling_edge("start", *first, first[0].domain[0], upwards=True),
@@ -47,10 +66,13 @@ def lay_out(
     ]
     corners = np.concatenate([e.curve(e.u)[0] for e in edges])
     size = float(np.linalg.norm(np.ptp(corners, axis=0)))
-    outline = tuple(e for e in edges if _length_bound(e) > COLLAPSED * size)
-    area = sum(surface_area(p) for p in chain.patches)
-    lines = (*_joints(chain, pairs), *_references(pairs, rulings))
-    return Pattern(outline, lines, area, _box(outline))
+    return tuple(e for e in edges if _length_bound(e) > COLLAPSED * size)
+
+
+def reference_lines(chain: Chain, pairs: Pairs, rulings: tuple[Array, ...]) -> tuple[Line, ...]:
+    """Joints (rulings where smooth, bends where creased), and of the certified ``rulings`` about
+    one for every 15 degrees of bending."""
+    return (*_joints(chain, pairs), *_references(pairs, rulings))
 
 
 def surface_area(patch: Patch) -> float:
@@ -106,7 +128,7 @@ def _integral(edge: Edge, density: PlaneDensity) -> float:
     return value if edge.u[-1] > edge.u[0] else -value
 
 
-def _rail_edges(name: str, patch: Patch, development: Development) -> list[Edge]:
+def _rail_edges(name: str, patch: Patch, unrolled: Unrolled) -> list[Edge]:
     """The image of the extent's end: t increases along the top and decreases along the base.
 
     In pieces where it has a corner: the edge of a thick sheet's middle, which stands square to
@@ -118,8 +140,7 @@ def _rail_edges(name: str, patch: Patch, development: Development) -> list[Edge]
         f = patch.frame(t)
         jet = patch.jet(t, 1)
         v, slope = (jet.v_to if top else jet.v_from)[:2]
-        origin, e = development.rulings(t)
-        m = np.column_stack([-e[:, 1], e[:, 0]])
+        origin, e, m = unrolled.axes(t)
         tangent = (f.p + slope)[:, None] * e + (f.q + v * f.a)[:, None] * m
         return origin + v[:, None] * e, tangent
 
@@ -150,13 +171,11 @@ def _kept_inside(curve: PlaneCurve, run: Array) -> PlaneCurve:
     return lambda t: curve(np.clip(t, low, high))
 
 
-def _ruling_edge(
-    name: str, patch: Patch, development: Development, t: float, *, upwards: bool
-) -> Edge:
+def _ruling_edge(name: str, patch: Patch, unrolled: Unrolled, t: float, *, upwards: bool) -> Edge:
     """The image of one ruling, u = v."""
     at = np.array([t])
     jet = patch.jet(at, 0)
-    origin, direction = development.origin(at)[0], development.direction(at)[0]
+    origin, direction = (image[0] for image in unrolled.axes(at)[:2])
     ends = np.array([jet.v_from[0, 0], jet.v_to[0, 0]])
 
     def curve(v: Array) -> tuple[Array, Array]:
@@ -172,40 +191,40 @@ def _length_bound(edge: Edge) -> float:
 
 
 def _ruling_lines(
-    layer: str, patch: Patch, development: Development, t: Array, angle: float
+    layer: str, patch: Patch, unrolled: Unrolled, t: Array, angle: float
 ) -> list[Line]:
     """The images of the rulings at t (n,)."""
     jet = patch.jet(t, 0)
-    starts = development.points(t, jet.v_from[0])
-    ends = development.points(t, jet.v_to[0])
+    starts = unrolled.points(t, jet.v_from[0])
+    ends = unrolled.points(t, jet.v_to[0])
     return [Line(layer, start, end, angle) for start, end in zip(starts, ends, strict=True)]
 
 
-def _joints(chain: Chain, pairs: list[tuple[Patch, Development]]) -> list[Line]:
+def _joints(chain: Chain, pairs: Pairs) -> list[Line]:
     """The joints between patches as lines: rulings where smooth, else bends up or down."""
     out = []
-    for (patch, development), joint in zip(pairs[1:], chain.joints, strict=True):
+    for (patch, unrolled), joint in zip(pairs[1:], chain.joints, strict=True):
         bend = "BEND_UP" if joint.angle > 0.0 else "BEND_DOWN"
         layer, angle = ("RULING", 0.0) if joint.smooth else (bend, joint.angle)
         at = np.array(patch.domain[:1])
-        out += _ruling_lines(layer, patch, development, at, angle)
+        out += _ruling_lines(layer, patch, unrolled, at, angle)
     return out
 
 
-def _references(pairs: list[tuple[Patch, Development]], rulings: tuple[Array, ...]) -> list[Line]:
+def _references(pairs: Pairs, rulings: tuple[Array, ...]) -> list[Line]:
     """Certified rulings to bend along, one for every 15 degrees of bending."""
     out = []
-    for (patch, development), t in zip(pairs, rulings, strict=True):
+    for (patch, unrolled), t in zip(pairs, rulings, strict=True):
         if len(t) < 3:
             continue
         bending = np.cumsum(np.abs(patch.frame(0.5 * (t[1:] + t[:-1])).c) * np.diff(t))[:-1]
         step = np.floor(bending / LINE_EVERY + 1e-9)
         picked = np.flatnonzero(np.diff(step, prepend=0.0) > 0.0)
-        out += _ruling_lines("RULING", patch, development, t[picked + 1], 0.0)
+        out += _ruling_lines("RULING", patch, unrolled, t[picked + 1], 0.0)
     return out
 
 
-def _box(outline: tuple[Edge, ...]) -> tuple[float, float, float, float]:
+def bounds(outline: tuple[Edge, ...]) -> tuple[float, float, float, float]:
     """The exact bounding box: the extremes of every edge."""
     points = np.concatenate([_extremes(edge) for edge in outline])
     low, high = points.min(axis=0), points.max(axis=0)

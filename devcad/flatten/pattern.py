@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -17,12 +18,23 @@ PlaneCurve = Callable[[Array], tuple[Array, Array]]
 """u (n,) -> points (n, 2) and derivatives d/du (n, 2)."""
 
 
+class Unrolled(Protocol):
+    """A patch laid out in a plane, its rulings straight and evenly divided."""
+
+    def axes(self, t: Array) -> tuple[Array, Array, Array]:
+        """The images of c0(t), e(t) and m(t), each (n, 2)."""
+
+    def points(self, t: Array, v: Array) -> Array:
+        """The images of the surface points (t, v), each (n,), shape (n, 2)."""
+
+
 @dataclass(frozen=True, slots=True)
 class Edge:
-    """One smooth piece of an outline, run from ``u[0]`` to ``u[-1]`` (increasing or decreasing).
+    """One smooth line, run from ``u[0]`` to ``u[-1]`` (increasing or decreasing).
 
     ``curve`` is callable at any u between; ``u`` (k,) lists the ends and, between them, the
-    places where the curve is only tangent continuous. ``name`` is start, end, base or top.
+    places where the curve is only tangent continuous. ``name`` is start, end, base or top for a
+    piece of an outline, and the layer, such as ENGRAVE, for a drawing.
     """
 
     name: str
@@ -49,7 +61,8 @@ class Pattern:
     """``outline`` runs counterclockwise along the edges in order, each end the next start.
 
     ``lines`` are the reference lines inside it, ``area`` is the exact area in mm2,
-    ``bbox`` = (xmin, ymin, xmax, ymax) the exact bounding box.
+    ``bbox`` = (xmin, ymin, xmax, ymax) the exact bounding box. ``drawings`` are curves on the
+    sheet that no cutter cuts through, open or closed, each on the layer that its name says.
     """
 
     outline: tuple[Edge, ...]
@@ -57,6 +70,7 @@ class Pattern:
     area: float
     bbox: tuple[float, float, float, float]
     holes: tuple[tuple[Edge, ...], ...] = ()
+    drawings: tuple[Edge, ...] = ()
 
 
 def sample(edge: Edge, per_piece: int) -> Array:

@@ -9,7 +9,7 @@ from devcad.flatten.arcs import Keep, assemble
 from devcad.flatten.loops import Loop, Path
 from devcad.flatten.measure import deviation
 from devcad.flatten.pattern import Edge
-from devcad.flatten.trace import Trace, evaluate, turns, unit_tangents
+from devcad.flatten.trace import Trace, evaluate, trace, turns, unit_tangents
 from devcad.geometry.taylor import Array
 
 CHORD = 0.02  # mm, the largest distance that a polyline may keep from its curve
@@ -24,6 +24,11 @@ def polyline_outline(outline: tuple[Edge, ...], tolerance: float) -> Loop:
         CheckFailed: the tolerance is below the rounding of the numbers.
     """
     return assemble(outline, min(tolerance, CHORD), polyline)
+
+
+def polyline_edge(edge: Edge, tolerance: float) -> Path:
+    """One edge as straight segments, as in :func:`polyline_outline`."""
+    return polyline(trace(edge, tolerance / 50.0), min(tolerance, CHORD))
 
 
 def polyline(traced: Trace, tolerance: float, keep: Keep = (None, None)) -> Path:

@@ -13,7 +13,7 @@ from devcad.flatten.arcs import Keep, end_direction, pieces, traced_edges
 from devcad.flatten.loops import Path
 from devcad.flatten.measure import CERTIFICATE
 from devcad.flatten.pattern import Edge
-from devcad.flatten.trace import Trace, unit_tangents
+from devcad.flatten.trace import Trace, trace, unit_tangents
 from devcad.flatten.trace import evaluate as evaluate_edge
 from devcad.geometry.taylor import Array
 
@@ -62,6 +62,13 @@ def spline_outline(
         _joined([spline_or_path(t, part, tolerance) for part in stretches(t, keep)], a, b)
         for t, a, b in zip(traces, corners, after, strict=True)
     )
+
+
+def spline_edge(edge: Edge, tolerance: float) -> tuple[Path | Spline, ...]:
+    """One open edge as lines, arcs and cubic splines, as in :func:`spline_outline`."""
+    traced = trace(edge, tolerance / 50.0)
+    items = [spline_or_path(traced, part, tolerance) for part in stretches(traced, (None, None))]
+    return _joined(items, traced.points[0], traced.points[-1])
 
 
 def stretches(traced: Trace, keep: Keep) -> list[tuple[int, int, Path | None, Keep]]:

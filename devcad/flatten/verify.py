@@ -16,6 +16,8 @@ from devcad.geometry.taylor import Array, rows_dot
 
 STENCIL = np.array([1 / 280, -4 / 105, 1 / 5, -4 / 5, 0.0, 4 / 5, -1 / 5, 4 / 105, -1 / 280])
 """Central difference of order 8, weights at -4 .. 4 steps."""
+ROUNDING = 8.0 * np.finfo(float).eps
+"""Of a pattern coordinate, several operations and nine summands of the stencil on."""
 TRACED = 1e-5
 """Share of the pattern's size to which its outline is traced in the search for overlaps."""
 STEPS_PER_PANEL = 800.0
@@ -28,7 +30,8 @@ def isometry(patch: Patch, development: Development) -> Extreme:
     The surface's first fundamental form comes from the series of c0 and e; the pattern's from
     distances between pattern points a small step in t apart (differences of order 8), at
     parameters of its own, on both ends and the middle of the extent. Relative to the largest
-    speed on the ruling, so that an apex does not divide by zero.
+    speed on the ruling, so that an apex does not divide by zero; what rounding of the pattern's
+    coordinates makes of the differences, on a strip much narrower than its place, is taken off.
     """
     knots = development.series.knots
     share = 0.02 + 0.96 * ((np.arange(40) * 0.618033988749895 + 0.1) % 1.0)
@@ -44,10 +47,13 @@ def isometry(patch: Patch, development: Development) -> Extreme:
     worst = Extreme(0.0, float(t[0]), float(ends[0][0]))
     for v, tangent in zip(ends, tangents, strict=True):
         slope = _slope(development, t, v, step)
+        place = np.abs(development.origin(t)).max(axis=1) + np.abs(v)
+        rounding = ROUNDING * place / (step * speed)
         error = np.maximum(
             np.abs(rows_dot(slope, slope) - rows_dot(tangent, tangent)) / speed**2,
             np.abs(rows_dot(slope, direction) - rows_dot(tangent, jet.e[0])) / speed,
         )
+        error = np.maximum(error - rounding, 0.0)
         k = int(np.nanargmax(error)) if not np.isnan(error).all() else 0
         if not error[k] <= worst.value:
             worst = Extreme(float(error[k]), float(t[k]), float(v[k]))

@@ -13,6 +13,10 @@ from devcad.geometry.taylor import Array
 
 SMOOTH = 1e-9
 """Largest angle in radians between two tangent planes that count as one."""
+STILL = 1e-9
+"""A rail slower than this share of its largest speed stands still."""
+TIP = 1e-12
+"""A ruling shorter than this share of the chain's size is a point."""
 JOINED = 1e-8
 """Largest gap between neighbouring rulings, as a share of the chain's size."""
 
@@ -79,8 +83,16 @@ def link(patches: tuple[Patch, ...], *, base_closed: bool, tolerance: float) -> 
                 limit=JOINED * size,
                 remedy="make the curve and the extent continuous at its corners",
             )
+        if _point_like(before, 1, size):
+            raise GeometryError(
+                f"patches {k + 1} and {k + 2} meet in a point, not along a ruling, at "
+                f"t = {after.domain[0]:.6g}",
+                remedy="keep from < to at the corners of the curve, or make two panels",
+            )
         joints.append(_joint(before, after))
     chain = Chain(patches, tuple(joints))
+    if _point_like(patches[0], 0, size):
+        return chain  # a sheet that begins with a tip has no ruling to close along
     first, last = _end(patches[0], 0), _end(patches[-1], 1)
     if np.linalg.norm(first - last, axis=1).max() <= 0.01 * tolerance:
         return replace(chain, closing=_joint(patches[-1], patches[0]), closes=True)
@@ -120,7 +132,8 @@ def cut_at(chain: Chain, t: float) -> Chain:
     head = [at.restricted(t, at.domain[1])] if t < at.domain[1] else []
     tail = [at.restricted(at.domain[0], t)]
     ahead, behind = [*head, *after], [*before, *tail]
-    if chain.closing.smooth and abs(chain.closing.shift) <= 1e-12 and ahead:
+    plain = chain.closing.smooth and abs(chain.closing.shift) <= 1e-12
+    if plain and ahead and _one_run(ahead[-1], behind[0]):
         ahead[-1:], behind = [_merged(ahead[-1], behind[0])], behind[1:]
     return link(tuple(ahead + behind), base_closed=True, tolerance=np.inf)
 
@@ -162,6 +175,28 @@ def with_gap(chain: Chain, gap: float) -> Chain:
         low, high = (middle, high) if width(middle) >= gap else (low, middle)
     kept = last.restricted(last.domain[0], low)
     return replace(chain, patches=(*chain.patches[:-1], kept), closing=None)
+
+
+def _one_run(before: Patch, after: Patch) -> bool:
+    """Whether both rails run on from one patch to the next: none turns at their joint, and none
+    is a point on one side only."""
+    paces = [_paces(before, -1), _paces(after, 0)]
+    points, turns = (np.array([pace[k] for pace in paces]) for k in (0, 1))
+    return bool((points[0] == points[1]).all() and not turns.any())
+
+
+def _paces(patch: Patch, row: int) -> tuple[list[bool], list[bool]]:
+    """Of both rails, whether it is a point, and whether it moves but stands still at the patch's
+    first (0) or last (-1) ruling."""
+    jet = patch.jet(np.linspace(*patch.domain, 9), 1)
+    speeds = [np.linalg.norm(jet.rail(v)[1], axis=1) for v in (jet.v_from, jet.v_to)]
+    fastest = max(float(speed.max()) for speed in speeds)
+    points = [float(speed.max()) <= STILL * fastest for speed in speeds]
+    turns = [
+        not point and float(speed[row]) <= STILL * float(speed.max())
+        for point, speed in zip(points, speeds, strict=True)
+    ]
+    return points, turns
 
 
 def _merged(first: Patch, second: Patch) -> Patch:
@@ -208,6 +243,12 @@ def _end(patch: Patch, end: int) -> Array:
     """The two end points of the first (0) or last (1) ruling, (2, 3)."""
     jet = patch.jet([patch.domain[end]], 0)
     return np.asarray(jet.c0[0] + np.stack([jet.v_from[0], jet.v_to[0]]) * jet.e[0])
+
+
+def _point_like(patch: Patch, end: int, size: float) -> bool:
+    """Whether the first (0) or last (1) ruling is the point of a tip."""
+    low, high = _end(patch, end)
+    return float(np.linalg.norm(high - low)) <= TIP * size
 
 
 def _ruling(patch: Patch, end: int) -> Array:

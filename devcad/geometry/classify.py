@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from devcad.geometry import chebyshev
+from devcad.geometry.deflation import vanishing
 from devcad.geometry.patch import Frame, Patch
 from devcad.geometry.taylor import Array, rows_dot
 
@@ -37,6 +38,10 @@ class Shape:
 
 EXACT = 1e-9
 """A patch is what it can be moved onto with no point moving more than this share of its size."""
+
+
+ASIDE = 1e-6
+"""Share of the domain by which samples keep away from an end whose ruling is singular."""
 
 
 def classify(patch: Patch) -> Shape:
@@ -71,14 +76,26 @@ def panels(patch: Patch) -> tuple[float, ...]:
     ends = rails(np.linspace(*patch.domain, 9)[1:-1])
     size = float(np.abs(ends - ends.mean(axis=0)).max())
     # a millionth of the size is enough to see a wave
-    return tuple(chebyshev.resolve(rails, patch.segments, scale=1e8 * size).knots.tolist())
+    return tuple(chebyshev.resolve(rails, patch.segments, scale=1e6 * size).knots.tolist())
 
 
 def sample_parameters(patch: Patch, per_panel: int) -> Array:
     """Parameters strictly inside every panel of the patch and next to its ends, increasing."""
-    return np.concatenate(
+    t = np.concatenate(
         [chebyshev.nodes(low, high, per_panel) for low, high in pairwise(panels(patch))]
     )
+    return kept_aside(patch, t)
+
+
+def kept_aside(patch: Patch, t: Array) -> Array:
+    """Increasing parameters, kept a millionth of the domain away from an end where the whole
+    ruling is singular: ratios of what vanishes there are read to 1e-10 and still mean the end."""
+    low, high = patch.domain
+    singular = vanishing(patch.field, low, high)
+    if not any(singular):
+        return t
+    inset = ASIDE * (high - low)
+    return np.unique(np.clip(t, low + inset * singular[0], high - inset * singular[1]))
 
 
 def patch_size(frame: Frame) -> float:
@@ -116,9 +133,10 @@ def _as_cylinder(frame: Frame, size: float) -> Shape | None:
     if (np.linalg.norm(frame.e - axis, axis=1) * half).max() > EXACT * size:
         return None
     with np.errstate(divide="ignore", invalid="ignore"):
-        centre = frame.c0 + (frame.q / frame.c)[:, None] * frame.n
-    if not np.isfinite(centre).all():
+        radii = frame.q / frame.c
+    if not (np.abs(radii) <= size / EXACT).all():  # flat somewhere, so that no circle fits
         return Shape("cylinder", axis=axis)
+    centre = frame.c0 + radii[:, None] * frame.n
     across = np.eye(3) - np.outer(axis, axis)
     point = (centre @ across).mean(axis=0)
     distance = np.linalg.norm((frame.c0 - point) @ across, axis=1)

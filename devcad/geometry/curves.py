@@ -3,10 +3,7 @@
 One pydantic model a kind, each with ``curve()``; ``CurveSpec`` is their union. Lengths are in
 the job's units, whatever they are: nothing here depends on the scale except the gap allowed in
 a chain, which reads ``mm_per_unit`` from the validation context (default 1). Angles are degrees
-in the job and radians in the model. The annotated types serve the constructions too.
-
-A refusal is a JobError or LimitError (both ValueErrors) raised during validation; pydantic
-keeps it as ``error["ctx"]["error"]``.
+in the job and radians in the model. ``curves_fields`` holds the annotated types.
 """
 
 from __future__ import annotations
@@ -15,101 +12,43 @@ import math
 from abc import abstractmethod
 from dataclasses import replace
 from functools import partial
-from typing import Annotated, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import (
-    AfterValidator,
-    BaseModel,
-    ConfigDict,
     Field,
-    PlainValidator,
+    GetJsonSchemaHandler,
     PrivateAttr,
     ValidationInfo,
-    WithJsonSchema,
+    ValidatorFunctionWrapHandler,
+    WrapValidator,
     model_validator,
 )
 
 from devcad.errors import JobError
-from devcad.geometry import jets, linked, natural, paths, splines, taylor, values
+from devcad.geometry import jets, linked, locus, natural, paths, splines, values
 from devcad.geometry.curve import Curve, ends_meet, samples
+from devcad.geometry.curves_fields import ConstantExpression as ConstantExpression
+from devcad.geometry.curves_fields import Count as Count
+from devcad.geometry.curves_fields import Degrees as Degrees
+from devcad.geometry.curves_fields import Direction as Direction
+from devcad.geometry.curves_fields import Flag as Flag
+from devcad.geometry.curves_fields import Interval as Interval
+from devcad.geometry.curves_fields import Model as Model
+from devcad.geometry.curves_fields import Number as Number
+from devcad.geometry.curves_fields import Points as Points
+from devcad.geometry.curves_fields import Positive as Positive
+from devcad.geometry.curves_fields import ScalarExpression as ScalarExpression
+from devcad.geometry.curves_fields import SurfaceExpression as SurfaceExpression
+from devcad.geometry.curves_fields import Sweep as Sweep
+from devcad.geometry.curves_fields import Vector as Vector
+from devcad.geometry.curves_fields import VectorExpression as VectorExpression
+from devcad.geometry.curves_fields import vector_jet as vector_jet
 from devcad.geometry.jets import Expression
-from devcad.geometry.taylor import Array
 from devcad.geometry.values import unit as unit
 
 FULL_TURN = 2.0 * math.pi
 MAX_GAP = 1e-6  # mm, between the curves of a chain
-
-
-class Model(BaseModel):
-    """What every table of a job file is: frozen, no unknown keys, no NaN, no infinity."""
-
-    model_config = ConfigDict(
-        defer_build=True,  # a job uses one or two of the many kinds
-        extra="forbid",
-        frozen=True,
-        allow_inf_nan=False,
-        arbitrary_types_allowed=True,
-        validate_by_name=True,
-        validate_by_alias=True,
-    )
-
-
-# --- annotated types -----------------------------------------------------------------------
-
-
-NUMBER_OR_TEXT = {"anyOf": [{"type": "number"}, {"type": "string"}]}
-
-Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
-"""A finite number; integers are taken, texts and booleans are not."""
-Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0.0)]
-"""A finite number above 0."""
-Count = Annotated[int, Field(strict=True, ge=1)]
-"""A whole number from 1 on."""
-Flag = Annotated[bool, Field(strict=True)]
-"""true or false."""
-Degrees = Annotated[Number, AfterValidator(math.radians), WithJsonSchema({"type": "number"})]
-"""An angle: degrees in the job, radians in the model."""
-Sweep = Annotated[
-    Number,
-    AfterValidator(values.sweep),
-    WithJsonSchema({"type": "number", "minimum": -360, "maximum": 360}),
-]
-"""An angle of at most a full turn either way, not 0: degrees in the job, radians in the model."""
-Vector = tuple[Number, Number, Number]
-"""Three finite numbers."""
-Points = tuple[Vector, ...]
-"""Any number of points."""
-Direction = Annotated[Vector, AfterValidator(values.nonzero)]
-"""Three finite numbers, not all 0; any length."""
-ScalarExpression = Annotated[
-    Expression,
-    PlainValidator(partial(values.expression, names=("t",))),
-    WithJsonSchema(NUMBER_OR_TEXT),
-]
-"""A number, or a text with an expression in t."""
-SurfaceExpression = Annotated[
-    Expression,
-    PlainValidator(partial(values.expression, names=("u", "v"))),
-    WithJsonSchema(NUMBER_OR_TEXT),
-]
-"""A number, or a text with an expression in u and v."""
-VectorExpression = tuple[ScalarExpression, ScalarExpression, ScalarExpression]
-"""Three numbers or expressions in t."""
-ConstantExpression = Annotated[
-    float, PlainValidator(values.constant), WithJsonSchema(NUMBER_OR_TEXT)
-]
-"""A number, or a text with a constant expression such as "2*pi"."""
-Interval = Annotated[
-    tuple[ConstantExpression, ConstantExpression], AfterValidator(values.increasing)
-]
-"""[from, to] with from < to, numbers or constant expressions."""
-
-
-def vector_jet(expressions: VectorExpression, t: Array, order: int) -> Array:
-    """The Taylor series (order + 1, n, 3) of three expressions at t (n,)."""
-    variable = taylor.variable(t, order)
-    return np.stack([part.series(t=variable) for part in expressions], axis=-1)
 
 
 # --- the kinds -----------------------------------------------------------------------------
@@ -365,6 +304,66 @@ class NaturalCurve(CurveModel):
         )
 
 
+class _OrFormula:
+    """In the JSON Schema: the same, or a text."""
+
+    def __get_pydantic_json_schema__(
+        self, core: Any, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        return {"anyOf": [{"type": "string"}, handler(core)]}
+
+
+def _or_formula(value: Any, handler: ValidatorFunctionWrapHandler) -> Any:
+    """A text is an expression in x, y and z, anything else a curve."""
+    if isinstance(value, str | Expression):
+        return values.expression(value, ("x", "y", "z"))
+    return handler(value)
+
+
+class PseudoAntipodalCurve(CurveModel):
+    """Points s C + (1 - s) D: the line from C through a fixed point meets the shape again in D.
+
+    C runs along the curve ``on``, or along ``curve`` on the surface on = 0; ``point`` is A.
+    With ``from`` = "D" the points are s D + (1 - s) C. s may be an expression in t.
+
+    Source: geometry.md, section 5 (Yang); which end s counts from is reconstructed.
+    """
+
+    kind: Literal["pseudo-antipodal"]
+    on: Annotated[CurveSpec, WrapValidator(_or_formula), _OrFormula()]
+    curve_on: CurveSpec | None = Field(default=None, alias="curve")
+    point: Vector
+    s: ScalarExpression
+    start: Literal["C", "D"] = Field(default="C", alias="from")
+
+    @model_validator(mode="after")
+    def _one_form(self) -> PseudoAntipodalCurve:
+        if (self._formula is None) == (self.curve_on is None):
+            return self
+        raise JobError(
+            "a pseudo-antipodal curve is on a curve, or on a surface with a curve on that",
+            remedy='on = curve, or on = "f(x, y, z)" and curve = C(t), which lies on f = 0',
+        )
+
+    @property
+    def _formula(self) -> Expression | None:
+        """The surface's expression."""
+        on: Any = self.on
+        return on if isinstance(on, Expression) else None
+
+    def curve(self) -> Curve:
+        """The curve."""
+        point, formula = np.array(self.point), self._formula
+        if formula is None or self.curve_on is None:
+            curve = self.on.curve()
+            other = locus.on_curve(curve, point)
+        else:
+            curve = self.curve_on.curve()
+            other = locus.on_surface(formula, curve, point)
+        pair = (curve, other) if self.start == "C" else (other, curve)
+        return locus.blended(*pair, self.s)
+
+
 CurveSpec = Annotated[
     ExpressionCurve
     | PointsCurve
@@ -375,7 +374,8 @@ CurveSpec = Annotated[
     | CircleCurve
     | EllipseCurve
     | HelixCurve
-    | NaturalCurve,
+    | NaturalCurve
+    | PseudoAntipodalCurve,
     Field(discriminator="kind"),
 ]
 """Any curve kind of a job file."""

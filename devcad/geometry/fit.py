@@ -39,11 +39,17 @@ _DENSE: Array = np.linspace(0.0, 1.0, 33)  # the same for the final certificate
 
 @dataclass(frozen=True, slots=True)
 class Spline:
-    """A clamped B-spline: ``knots`` (n + degree + 1,), ``poles`` (n, k)."""
+    """A clamped B-spline: ``knots`` (n + degree + 1,), ``poles`` (n, k).
+
+    ``exact`` says that it is the curve itself and no fit; ``weights`` (n, k), alike in the
+    columns that are one point, make it rational.
+    """
 
     degree: int
     knots: Array
     poles: Array
+    exact: bool = False
+    weights: Array | None = None
 
     def __call__(self, s: Array) -> Array:
         """The points at s (m,), shape (m, k)."""
@@ -51,19 +57,29 @@ class Spline:
         span = np.searchsorted(self.knots[self.degree + 1 : last], s, side="right") + self.degree
         weights = _basis(self.knots, self.degree, span, s)
         picked = span[:, None] + np.arange(-self.degree, 1)
-        return np.asarray(np.einsum("ma,mak->mk", weights, self.poles[picked]))
+        if self.weights is None:
+            return np.asarray(np.einsum("ma,mak->mk", weights, self.poles[picked]))
+        shares = weights[:, :, None] * self.weights[picked]
+        return np.asarray((shares * self.poles[picked]).sum(axis=1) / shares.sum(axis=1))
+
+    def denominator(self, s: Array) -> Array:
+        """The sum of the first curve's weighted basis functions at s (m,), 1 without weights."""
+        if self.weights is None:
+            return np.ones(len(s))
+        return Spline(self.degree, self.knots, self.weights[:, :1])(s)[:, 0]
 
     @property
     def derivative(self) -> Spline:
-        """The derivative, a spline of one degree less."""
+        """The derivative of a spline without weights, one degree less."""
         p = self.degree
         width = self.knots[p + 1 : -1] - self.knots[1 : -p - 1]
         poles = p * np.diff(self.poles, axis=0) / width[:, None]
-        return Spline(p - 1, self.knots[1:-1], poles)
+        return Spline(p - 1, self.knots[1:-1], poles, self.exact)
 
     def part(self, columns: slice) -> Spline:
         """Some of the curves alone, on the same knots."""
-        return Spline(self.degree, self.knots, self.poles[:, columns])
+        weights = None if self.weights is None else self.weights[:, columns]
+        return Spline(self.degree, self.knots, self.poles[:, columns], self.exact, weights)
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,7 +136,9 @@ class Ends:
     slopes: tuple[Array, Array] | None = None
 
 
-def fit(curves: Curves, course: Course, ends: Ends, demand: Demand) -> Fit:
+def fit(
+    curves: Curves, course: Course, ends: Ends, demand: Demand, start: Array | None = None
+) -> Fit:
     """Splines within the demanded tolerance and twist on as few spans as grading finds.
 
     Least squares on Chebyshev points per span, ends met exactly; spans are regraded all together
@@ -130,11 +148,16 @@ def fit(curves: Curves, course: Course, ends: Ends, demand: Demand) -> Fit:
     Args:
         curves: points (n, k) at t (n,), k columns in mm.
         course: t against s, with the breaks.
+        start: distinct knots that are taken as they are if they reach the demand.
     Returns:
         the fit with its error and twist, measured at 33 places per span.
     Raises:
         GeometryError: not reached with 4000 spans, or the curves are not numbers.
     """
+    if start is not None:
+        spline = _least_squares(curves, course, start, ends, demand.degree)
+        if (given := _certified(spline, curves, course, start, demand)) is not None:
+            return given
     first = max(4 // (len(course.s) - 1), 1) + 1
     knots = np.unique(np.concatenate([np.linspace(a, b, first) for a, b in pairwise(course.s)]))
     best: Fit | None = None

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
 from devcad.geometry.chain import Chain, Joint
@@ -30,6 +32,7 @@ def layer_ends(chain: Chain, number: int, frame: Frame, distance: float) -> tupl
 def at_apex(frame: Frame, v: Array) -> bool:
     """Whether every ruling of the frame becomes singular at v: the extent ends at an apex."""
     scale = np.abs(frame.q) + np.abs(frame.a) * np.maximum(np.abs(frame.v_from), np.abs(frame.v_to))
+    scale = np.maximum(scale, EXACT * scale.max())  # a tip at the apex has none of its own
     return bool((np.abs(frame.q + v * frame.a) <= EXACT * scale).all() and (scale > 0.0).all())
 
 
@@ -58,6 +61,18 @@ def mitre(frame: Frame, row: int, joint: Joint | None) -> Array:
     half = -0.5 * joint.angle if row == 0 else 0.5 * joint.angle
     # turning about e carries m towards n, hence n towards -m
     return np.asarray(frame.n[row] - np.tan(half) * frame.m[row])
+
+
+def layer_gaps(chain: Chain, layers: tuple[float, ...]) -> list[float]:
+    """How far the neighbours' layers are apart at the end of each patch that has a next one, mm:
+    for every joint, and last for the closing of a tube."""
+    ends = []
+    for number, patch in enumerate(chain.patches):
+        low, high = patch.domain
+        frame = patch.frame([np.nextafter(low, high), np.nextafter(high, low)])
+        ends.append(np.stack([layer_ends(chain, number, frame, d) for d in layers]))
+    pairs = pairwise([*ends, ends[0]] if chain.closed else ends)
+    return [float(np.linalg.norm(a[:, :, -1] - b[:, :, 0], axis=2).max()) for a, b in pairs]
 
 
 def straight_sided(patch: Patch) -> bool:

@@ -19,6 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from devcad.geometry import taylor
+from devcad.geometry.deflation import deflated
 from devcad.geometry.taylor import Array, rows_cross, rows_dot
 
 
@@ -94,9 +95,14 @@ class Patch:
     causal: str | None = None
 
     @property
+    def ends(self) -> tuple[float, ...]:
+        """The domain's ends with the breaks between them, increasing."""
+        return (self.domain[0], *self.breaks, self.domain[1])
+
+    @property
     def segments(self) -> Array:
         """The domain's ends with the breaks between them, increasing, (k + 1,)."""
-        return np.array([self.domain[0], *self.breaks, self.domain[1]])
+        return np.array(self.ends)
 
     def jet(self, t: npt.ArrayLike, order: int) -> RulingJet:
         """The Taylor series of c0, e and the extent at t, (n,) or a number."""
@@ -105,8 +111,8 @@ class Patch:
     def frame(self, t: npt.ArrayLike) -> Frame:
         """The frame and its coefficients at t, (n,) or a number.
 
-        n is nan where q + v a vanishes all along the ruling (nothing there has a tangent
-        plane); that the result is regular elsewhere is not checked here.
+        Where q + v a vanishes all along the ruling, n and c are limits at an end of the domain
+        (a tip) and nan elsewhere; that the result is regular is not checked here.
         """
         t = np.atleast_1d(np.asarray(t, dtype=float))
         jet = self.field(t, 2)
@@ -120,6 +126,14 @@ class Patch:
             n = normal / width[:, None]
             m = rows_cross(n, e)
             c = rows_dot(ddc0 + inside * dde, n) / width
+        for end in deflated(self.field, self.ends, 1):
+            near = end.near(t)
+            if near.any():
+                w = end.series(t[near], 1)
+                size = np.linalg.norm(w[0], axis=1)
+                n[near] = w[0] / size[:, None]
+                m[near] = rows_cross(n[near], e[near])
+                c[near] = -rows_dot(w[1], m[near]) / size
         return Frame(
             t,
             jet.c0[0],
@@ -138,10 +152,16 @@ class Patch:
 
     def frame_jet(self, t: npt.ArrayLike, order: int) -> FrameJet:
         """The Taylor series of the frame and its coefficients at t, to the given order."""
-        jet = self.field(np.atleast_1d(np.asarray(t, dtype=float)), order + 2)
+        t = np.atleast_1d(np.asarray(t, dtype=float))
+        jet = self.field(t, order + 2)
         de, dc0 = taylor.derivative(jet.e), taylor.derivative(jet.c0)
         e = jet.e[: order + 2]
-        n = taylor.unit(taylor.cross(e, dc0 + _inner_height(jet)[None, :, None] * de))
+        w = taylor.cross(e, dc0 + _inner_height(jet)[None, :, None] * de)
+        for end in deflated(self.field, self.ends, order + 1):
+            near = end.near(t)
+            if near.any():
+                w[:, near] = end.series(t[near], order + 1)
+        n = taylor.unit(w)
         m = taylor.cross(n, e)
         k = order + 1
         return FrameJet(

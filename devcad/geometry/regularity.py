@@ -13,7 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from devcad.geometry import taylor
-from devcad.geometry.classify import EXACT, Shape, sample_parameters
+from devcad.geometry.classify import ASIDE, EXACT, Shape, kept_aside, sample_parameters
+from devcad.geometry.deflation import vanishing
 from devcad.geometry.patch import Patch
 from devcad.geometry.taylor import Array, rows_cross, rows_dot
 
@@ -21,6 +22,12 @@ INSIDE = 1e-3
 """Where P_t x e vanishes at an end, the twist is read at this share of the extent inside."""
 STRAIGHT = 1e-14
 """A ruling that turns by less than this share of the width across it does not turn."""
+JUMP = 1e-3
+"""A sign that changes while the value stays above this share of those around it jumps."""
+SIDE = 1e-9
+"""Share of the domain beside a jump of n at which its two sides are looked at."""
+CROSSED = 1e-6
+"""An end this share of the width beyond the regression curve is so by more than rounding."""
 PER_PANEL = 65
 """Samples of a panel in the search for a worst place."""
 
@@ -78,6 +85,11 @@ def warp(patch: Patch, t: Array) -> Array:
         at = still + v[:, None] * moving
         vanishes = np.linalg.norm(at, axis=1) <= EXACT * scale
         normals.append(np.where(vanishes[:, None], still + inner[:, None] * moving, at))
+    # at a tip the whole ruling has no tangent plane: what is read there is rounding
+    size = np.linalg.norm(jet.c0[1], axis=1) + (np.abs(v_from) + np.abs(v_to)) * np.linalg.norm(
+        jet.e[1], axis=1
+    )
+    normals[0] = np.where((scale <= EXACT * size)[:, None], normals[1], normals[0])
     turn = np.arctan2(rows_dot(jet.e[0], rows_cross(*normals)), rows_dot(normals[0], normals[1]))
     return np.where(np.abs(turn) > 0.5 * np.pi, turn - np.copysign(np.pi, turn), turn)
 
@@ -94,12 +106,15 @@ def clearance(patch: Patch, layers: tuple[float, ...], *, to_apex: bool = False)
     With ``to_apex`` the extent begins or ends at an apex: each layer ends by itself where it
     becomes singular, so only the other end counts.
     """
-
+    singular = _singular_ruling(patch)
+    if singular is not None:
+        v = float(patch.jet([singular], 0).v_from[0][0])
+        return Clearance(-np.inf, singular, v, touches=False)
     turned = _turnover(patch)
     if turned is not None:
         return Clearance(0.0, turned, float(patch.jet([turned], 0).v_from[0][0]), touches=False)
 
-    def margins(t: Array) -> tuple[Array, Array]:
+    def badness(t: Array) -> Array:
         frame = patch.frame(t)
         ends = np.stack([frame.v_from, frame.v_to])  # (2, n)
         width = frame.q + ends * frame.a
@@ -118,21 +133,34 @@ def clearance(patch: Patch, layers: tuple[float, ...], *, to_apex: bool = False)
             bends = np.where(low > 0.0, np.inf, low / np.abs(frame.c))
             distance = np.where(turns, low / np.abs(frame.a), bends)
         distance = np.where(low == 0.0, 0.0, distance)
-        return np.where(np.isnan(low), -np.inf, distance), ends[0]
-
-    def badness(t: Array) -> Array:
-        return np.asarray(-np.clip(margins(t)[0], -1e300, 1e300))
+        distance = np.where(np.isnan(low), -np.inf, distance)
+        return np.asarray(-np.clip(distance, -1e300, 1e300))
 
     value, t = largest(patch, badness)
     distance = -value if abs(value) < 1e300 else -np.sign(value) * np.inf
-    frame = patch.frame([t])
-    v = float(margins(np.array([t]))[1][0])
+    frame = patch.frame(kept_aside(patch, np.array([t])))
+    v = float(frame.v_from[0])
     other = float(frame.q[0] + max(frame.v_from[0] * frame.a[0], frame.v_to[0] * frame.a[0]))
     return Clearance(float(distance), t, v, touches=distance == 0.0 and other > 0.0)
 
 
+def _singular_ruling(patch: Patch) -> float | None:
+    """An end of the domain whose ruling is singular all along and not the point of a tip."""
+    low, high = patch.domain
+    for t, singular in zip((low, high), vanishing(patch.field, low, high), strict=True):
+        jet = patch.jet([t, *np.linspace(low, high, 9)[1:-1]], 0)
+        length = jet.v_to[0] - jet.v_from[0]
+        if singular and length[0] > EXACT * length.max():
+            return t
+    return None
+
+
 def _turnover(patch: Patch) -> float | None:
-    """A parameter where the normal turns faster than the patch bends: the front turns over."""
+    """A parameter where the normal turns faster than the patch bends: the front turns over.
+
+    Not where the regression curve only passes the place in the extent at which n is read: there
+    an end of the extent lies clearly beyond it.
+    """
     t = sample_parameters(patch, PER_PANEL)
     frame = patch.frame(t)
     step = np.diff(t)
@@ -146,7 +174,11 @@ def _turnover(patch: Patch) -> float | None:
         middle = 0.5 * (low + high)
         same = bool(patch.frame([middle]).n[0] @ before > 0.0)
         low, high = (middle, high) if same else (low, middle)
-    return 0.5 * (low + high)
+    aside = SIDE * (patch.domain[1] - patch.domain[0])
+    beside = patch.frame(np.clip([low - aside, high + aside], *patch.domain))
+    ends = np.stack([beside.v_from, beside.v_to]) * beside.a
+    crossed = (beside.q + ends < -CROSSED * (np.abs(beside.q) + np.abs(ends).max(axis=0))).any()
+    return None if crossed else 0.5 * (low + high)
 
 
 def smallest_radius(patch: Patch) -> Extreme:
@@ -174,7 +206,7 @@ def regression_curve(patch: Patch, number: int = 65) -> tuple[Array, Array] | No
     """Parameters and points (k, 3) of the curve v = -q/a; None where a vanishes throughout."""
     t = np.linspace(*patch.domain, number)
     t[0], t[-1] = np.nextafter(t[0], t[-1]), np.nextafter(t[-1], t[0])
-    frame = patch.frame(t)
+    frame = patch.frame(kept_aside(patch, t))
     reach = np.abs(frame.v_from) + np.abs(frame.v_to)
     there = np.abs(frame.a) * reach > 1e-6 * (np.abs(frame.q) + np.abs(frame.a) * reach)
     if not there.any():
@@ -225,9 +257,9 @@ def largest(patch: Patch, function: Callable[[Array], Array]) -> tuple[float, fl
 
 
 def _snapped(patch: Patch, t: float) -> float:
-    """The domain's end where t is within rounding of it: samples keep just inside."""
+    """The domain's end where t is as near to it as samples come."""
     low, high = patch.domain
-    width = 1e-12 * (high - low)
+    width = 1.001 * ASIDE * (high - low)
     return low if t - low < width else high if high - t < width else t
 
 
@@ -244,7 +276,10 @@ def _crosscap(patch: Patch, t: Array) -> Array:
 
 
 def _roots(patch: Patch, t: Array, function: Callable[[Patch, Array], Array]) -> list[float]:
-    """The sign changes of a function between samples, each refined by bisection."""
+    """The zeros at which a function changes its sign between samples, each by bisection.
+
+    Where a break lets it jump from one sign to the other there is no zero.
+    """
     values = function(patch, t)
     noise = 1e-11 * np.nanmax(np.abs(values), initial=0.0)
     sign = np.where(np.abs(values) <= noise, 0.0, np.sign(values))
@@ -258,7 +293,12 @@ def _roots(patch: Patch, t: Array, function: Callable[[Patch, Array], Array]) ->
             break
         same = np.sign(function(patch, middle)) == low_sign
         low, high = np.where(same, middle, low), np.where(same, high, middle)
-    return [float(x) for x in 0.5 * (low + high)]
+    root = 0.5 * (low + high)
+    if not len(root):
+        return []
+    around = np.minimum(np.abs(values[kept[change]]), np.abs(values[kept[change + 1]]))
+    vanishes = np.abs(function(patch, root)) <= JUMP * around
+    return [float(x) for x in root[vanishes]]
 
 
 def _edge_point(patch: Patch, t: float) -> Array | None:
@@ -278,6 +318,7 @@ def _nearest_edge_point(patch: Patch, t: Array) -> Singularity | None:
         v = -frame.q / frame.a
         gap = np.maximum(np.maximum(frame.v_from - v, v - frame.v_to), 0.0)
     best = int(np.nanargmin(np.where(np.isfinite(gap), gap, np.inf)))
-    place = _snapped(patch, float(t[best]))
-    point = _edge_point(patch, place)
-    return None if point is None else Singularity(place, point, "cuspidal-edge")
+    point = _edge_point(patch, float(t[best]))
+    if point is None:
+        return None
+    return Singularity(_snapped(patch, float(t[best])), point, "cuspidal-edge")

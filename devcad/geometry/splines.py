@@ -56,7 +56,7 @@ def interpolating(points: Array, degree: int) -> Curve:
     skip = (k + 1) // 2  # the ends of a spline of odd degree: this many points carry no knot
     inner = u[skip:-skip] if len(u) > k + 1 else u[:0]
     knots = np.concatenate([np.zeros(k + 1), inner, np.ones(k + 1)])
-    return _smooth(_spans(knots, np.asarray(make_interp_spline(u, points, k, t=knots).c), k))
+    return _smooth(piecewise(knots, np.asarray(make_interp_spline(u, points, k, t=knots).c), k))
 
 
 def interpolating_closed(points: Array, degree: int) -> Curve:
@@ -76,7 +76,7 @@ def interpolating_closed(points: Array, degree: int) -> Curve:
     full = BSpline.design_matrix(u[:-1], knots, k).tocoo()
     system = csr_array((full.data, (full.row, full.col % n)), shape=(n, n))
     control = splu(system.tocsc()).solve(points)
-    return _smooth(_spans(knots, control[np.arange(n + k) % n], k))
+    return _smooth(piecewise(knots, control[np.arange(n + k) % n], k))
 
 
 def bspline(degree: int, knots: Array, control: Array, weights: Array | None) -> Curve:
@@ -87,9 +87,9 @@ def bspline(degree: int, knots: Array, control: Array, weights: Array | None) ->
     a break otherwise.
     """
     if weights is None:
-        return _with_corners(_spans(knots, control, degree).jet, degree, knots)
+        return _with_corners(piecewise(knots, control, degree).jet, degree, knots)
     weighted = np.concatenate([control * weights[:, None], weights[:, None]], axis=1)
-    spans = _spans(knots, weighted, degree)
+    spans = piecewise(knots, weighted, degree)
 
     def jet(t: Array, order: int) -> Array:
         homogeneous = spans.jet(t, order)
@@ -104,8 +104,8 @@ def _chord_fractions(points: Array) -> Array:
     return np.asarray(u / u[-1])
 
 
-def _spans(knots: Array, control: Array, degree: int) -> Spans:
-    """The B-spline as a piecewise polynomial over its domain."""
+def piecewise(knots: Array, control: Array, degree: int) -> Spans:
+    """The B-spline with control points (n, d) as a piecewise polynomial over its domain."""
     from scipy.interpolate import BSpline
 
     spline = BSpline(knots, control, degree)

@@ -89,13 +89,24 @@ def load(path: str | Path) -> Job:
         the job's folder; LimitError: too large or too deep; FileError: missing, unreadable, not
         UTF-8. Several problems come as one InvalidJob.
     """
+    tree, digest = read_tree(path)
+    return job_of(tree, str(path), digest)
+
+
+def read_tree(path: str | Path) -> tuple[dict[str, Any], str]:
+    """The tables of a job file, the points of the files it names in them; and its ``sha256``.
+
+    Raises:
+        JobError, LimitError, FileError: as ``load``, where the file is no job file at all.
+    """
     place = str(path)
     data = read_bytes(Path(path), limit=MAX_JOB_BYTES, place=place)
     tree = parse_toml(decode(data, place=place), place=place)
     digest = hashlib.sha256(data)
     for table, where in _file_tables(tree, place):
         digest.update(_inline_points(table, Path(path).parent, where))
-    return _job(tree, place, digest.hexdigest())
+    _refuse_too_large(tree, place)
+    return tree, digest.hexdigest()
 
 
 def _file_tables(node: Any, place: str) -> Iterator[tuple[dict[str, Any], str]]:
@@ -130,10 +141,9 @@ def _inline_points(table: dict[str, Any], folder: Path, place: str) -> bytes:
     return data
 
 
-def _job(tree: dict[str, Any], place: str, sha256: str) -> Job:
-    """The Job of a tree; all its problems at once."""
-    _refuse_too_large(tree, place)
-    table, found = _validated(JobTable, tree, place, {})
+def job_of(tree: dict[str, Any], place: str, sha256: str) -> Job:
+    """The Job of a tree that ``read_tree`` gave; all its problems at once."""
+    table, found = validated(JobTable, tree, place, {})
     scale = MM_PER_UNIT.get(str(tree.get("units", "mm")), 1.0)
     surfaces: list[tuple[str, Surface]] = []
     for inner, where in _surface_tables(tree, place):
@@ -236,13 +246,13 @@ def _surface(
         return None, [error]
     if not isinstance(kind, str) or kind not in SURFACES:
         return None, [unknown_kind(str(kind), SURFACES, place=f"{place}.kind")]
-    return _validated(SURFACES[kind], tree, place, {"mm_per_unit": scale})
+    return validated(SURFACES[kind], tree, place, {"mm_per_unit": scale})
 
 
-def _validated(
+def validated(
     model: type[M], tree: Mapping[str, Any], place: str, context: dict[str, Any]
 ) -> tuple[M | None, list[DevcadError]]:
-    """The model of a tree, or its problems."""
+    """The model of a table at a place of the file, or its problems."""
     try:
         return model.model_validate(tree, context=context), []
     except ValidationError as error:

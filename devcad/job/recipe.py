@@ -15,7 +15,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationErr
 
 from devcad.checks import NAMES
 from devcad.errors import JobError
-from devcad.export import FORMATS, Options
+from devcad.export import DEFAULT_FORMATS, FORMATS, Options
 from devcad.importers.files import decode, read_bytes
 from devcad.importers.toml import parse_toml
 from devcad.job.invalid import did_you_mean, problems, raise_all
@@ -102,7 +102,7 @@ def resolve(
         JobError: no such recipe, format or check, or a recipe file that is wrong.
     """
     keys = {**_flat(_read(name or DEFAULT)), **_flat(override)}
-    chosen = known_formats(list(formats)) or keys.pop("formats", list(FORMATS))
+    chosen = known_formats(list(formats)) or keys.pop("formats", DEFAULT_FORMATS)
     keys.pop("formats", None)
     allowed = {*known_checks(list(allow)), *keys.pop("allow", ())}
     return Recipe(tuple(chosen), Options(**keys), frozenset(allowed))

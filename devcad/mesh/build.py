@@ -21,7 +21,7 @@ Places = NDArray[np.intp]
 Flat = Callable[[int, Array, Array], Array]
 """patch number, t (n,), v (n,) -> the places in the pattern (n, 2)."""
 COLLAPSED = 1e-12
-"""Points of one rail closer than this share of the part are one point: an apex."""
+"""Points closer than this share of the part are one point: an apex, or a tip without a ruling."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +73,10 @@ def build_mesh(
 
 
 class _Stations:
-    """The corner points of one patch's rulings: ``points[layer][end]`` is (n, 3)."""
+    """The corner points of one patch's rulings: ``points[layer][end]`` is (n, 3).
+
+    ``tips`` are the rows (0, -1) whose ruling is a point.
+    """
 
     def __init__(
         self,
@@ -103,6 +106,14 @@ class _Stations:
             for end in (0, 1):
                 if self._point_like[end]:
                     layer[end] = np.broadcast_to(layer[end][0], layer[end].shape).copy()
+        self.tips = [
+            row
+            for row in (0, -1)
+            if all(np.linalg.norm(a[row] - b[row]) <= COLLAPSED * size for a, b in self.points)
+        ]
+        for layer in self.points:
+            for row in self.tips:
+                layer[1][row] = layer[0][row]
         self.ids: list[list[Index]] = []
 
     def collapsed(self, end: int) -> bool:
@@ -182,6 +193,9 @@ def _share(stations: list[_Stations], chain: Chain) -> None:
             ]
             for layer in range(layers)
         ]
+        for low, high in s.ids:
+            for row in s.tips:
+                high[row] = low[row]
         start += len(s.t) - 1
     for before, after in itertools.pairwise(stations):
         _take_over(before, -1, after, 0)

@@ -39,6 +39,7 @@ PANEL_FACTS = (
     "cut_length",
     "pierces",
     "mass_g",
+    "lorentz_area",
     "figures",
     "notes",
 )

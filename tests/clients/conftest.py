@@ -39,6 +39,16 @@ length = 90
 """
 
 
+OPENED = """
+name = "opened-{kind}"
+[surface]
+kind = "{kind}"
+radius = 40
+cut = 2.5
+gap = 0.7
+"""
+
+
 def _jobs() -> dict[str, str]:
     """Every sample, the thick ones as surfaces without thickness too, and a part of two panels."""
     jobs = {path.stem: path.read_text() for path in sorted(SAMPLES.glob("*.toml"))}
@@ -47,7 +57,8 @@ def _jobs() -> dict[str, str]:
         for name, text in jobs.items()
         if "\nthickness" in text
     }
-    return jobs | sheets | {"pair": PAIR}
+    opened = {f"opened-{kind}": OPENED.format(kind=kind) for kind in ("oloid", "sphericon")}
+    return jobs | sheets | opened | {"pair": PAIR}
 
 
 JOBS = _jobs()

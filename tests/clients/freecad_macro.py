@@ -19,11 +19,12 @@ import Part
 def step_facts(path):
     shape = Part.Shape()
     shape.read(path)
-    try:
-        shape.check(True)  # True: the check made before boolean operations, stricter than validity
-        boolean_check = "ok"
-    except Exception as problem:
-        boolean_check = str(problem)
+    boolean_check = "ok"
+    for body in shape.Solids or shape.Shells:  # one by one: neighbouring panels touch each other
+        try:
+            body.check(True)  # True: as before boolean operations, stricter than validity
+        except Exception as problem:
+            boolean_check = str(problem)
     # By default its 0.20 without a window crashes on every assembly, its own kernel's too.
     settings = FreeCAD.ParamGet("User parameter:BaseApp/Preferences/Mod/Import/hSTEP")
     settings.SetBool("ReadShapeCompoundMode", False)

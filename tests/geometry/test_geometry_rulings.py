@@ -131,7 +131,6 @@ def test_an_edge_that_waves_three_hundred_times_is_seen(tmp_path):
     middle = t[:-1] + 0.37 * np.diff(t)
     ends, points = (patch.point(x, patch.frame(x).v_to) for x in (t, middle))
     away = points - (ends[:-1] + 0.37 * np.diff(ends, axis=0))
-    assert np.linalg.norm(away, axis=1).max() <= 1.3 * 0.1  # measured along, not across, the chord
     chord = np.diff(ends, axis=0)
     chord /= np.linalg.norm(chord, axis=1)[:, None]
     across = np.linalg.norm(away - (away * chord).sum(axis=1)[:, None] * chord, axis=1)

@@ -21,6 +21,21 @@ ROWS = {
     "tangent": "Tangent",
     "rectifying": "Rectifying",
     "line-of-curvature": "LineOfCurvature",
+    "envelope": "Envelope",
+    "tangent-planes": "TangentPlanes",
+    "oriented": "Oriented",
+    "darboux": "Darboux",
+    "principal-normal-darboux": "PrincipalNormalDarboux",
+    "focal": "Focal",
+    "bezier": "Bezier",
+    "loft": "Loft",
+    "translational": "Translational",
+    "pq-strip": "PqStrip",
+    "gore": "Gore",
+    "conic-map": "ConicMap",
+    "edge-surface": "EdgeSurface",
+    "oloid": "Oloid",
+    "sphericon": "Sphericon",
 }
 """Each kind's class; it stands in the file of the kind's name."""
 

@@ -24,6 +24,7 @@ from devcad.geometry.curve import Curve
 from devcad.geometry.curves import FULL_TURN, ConstantExpression, Model, ScalarExpression, Sweep
 from devcad.geometry.drawing import Drawing
 from devcad.geometry.patch import Patch, RulingJet
+from devcad.geometry.rail_fit import RailFit
 from devcad.geometry.taylor import Array
 
 
@@ -40,7 +41,8 @@ class BuiltPanel:
 
     ``base_closed`` says that the base curve returns to its start point. ``drawings`` are lines
     on the sheet, ``figures`` numbers by name that the report repeats in mm, ``notes`` sentences
-    that it repeats: what a user must know of this construction.
+    that it repeats: what a user must know of this construction. ``rail_fit`` is given by surfaces
+    that are looked for between rails.
     """
 
     patches: tuple[Patch, ...]
@@ -48,6 +50,7 @@ class BuiltPanel:
     drawings: tuple[Drawing, ...] = ()
     figures: Mapping[str, Figure] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    rail_fit: RailFit | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,9 +68,10 @@ def one_panel(
     drawings: tuple[Drawing, ...] = (),
     figures: Mapping[str, Figure] | None = None,
     notes: tuple[str, ...] = (),
+    rail_fit: RailFit | None = None,
 ) -> Built:
     """A surface of one panel."""
-    panel = BuiltPanel(tuple(patches), base_closed, drawings, figures or {}, notes)
+    panel = BuiltPanel(tuple(patches), base_closed, drawings, figures or {}, notes, rail_fit)
     return Built((panel,))
 
 
@@ -82,6 +86,8 @@ def _counterclockwise(value: float) -> float:
     return value
 
 
+TIP = 1e-12
+"""A first or last ruling shorter than this share of the widest is a tip."""
 NonNegative = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0.0)]
 """A finite number, 0 or above."""
 Turn = Annotated[Sweep, AfterValidator(_counterclockwise)]
@@ -121,8 +127,18 @@ Rays = Callable[[Array, int], tuple[Array, Array, Array | None]]
 is one unit of the extent (K + 1, n), None where the extent is a length already."""
 
 
-def strip(piece: Curve, rays: Rays, extent: Extent, *, causal: str | None = None) -> Patch:
+def strip(
+    piece: Curve,
+    rays: Rays,
+    extent: Extent,
+    *,
+    causal: str | None = None,
+    tips: bool = False,
+) -> Patch:
     """The patch over the domain of a piece of curve.
+
+    ``tips`` lets the first and the last ruling have no length: the extent's ends may coincide
+    there, to rounding against the widest ruling.
 
     Raises:
         JobError: the extent is not finite and increasing on a dense sample.
@@ -140,8 +156,12 @@ def strip(piece: Curve, rays: Rays, extent: Extent, *, causal: str | None = None
     for name, edge in zip(("from", "to"), edges, strict=True):
         require_finite(edge, t, f"extent: {name}")
     width = edges[1][0] - edges[0][0]
+    widest = max(float(width.max()), 0.0)
+    if tips:
+        ends = (t == piece.domain[0]) | (t == piece.domain[1])
+        width = np.where(ends & (np.abs(width) <= TIP * widest), widest, width)
     worst = int(np.argmin(width))
-    if not width[worst] > 0.0:
+    if not width[worst] > TIP * widest:
         low, high = (float(edge[0, worst]) for edge in edges)
         raise JobError(
             f"extent: from = {low:.6g} is not below to = {high:.6g} at t = {t[worst]:.6g}",
@@ -201,7 +221,12 @@ def require_apart(piece: Curve, squared: Scalar, what: str, remedy: str) -> None
         )
 
 
-def require_across(piece: Curve, rays: Rays, what: str) -> None:
+def require_across(
+    piece: Curve,
+    rays: Rays,
+    what: str,
+    remedy: str = "the surface has no tangent plane there; end the curve before that point",
+) -> None:
     """Raise a GeometryError where the curve runs along the rulings."""
 
     def squared_sine(t: Array, order: int) -> Array:
@@ -214,7 +239,7 @@ def require_across(piece: Curve, rays: Rays, what: str) -> None:
             f"{what} at t = {at:.6g}",
             value=float(np.sqrt(max(least, 0.0))),
             limit=VANISHES,
-            remedy="the surface has no tangent plane there; end the curve before that point",
+            remedy=remedy,
         )
 
 

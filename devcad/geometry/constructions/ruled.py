@@ -98,12 +98,21 @@ def _along(piece: Curve, direction: VectorExpression, extent: Extent) -> Patch:
 
 def _between(first: Curve, second: Curve, extent: Extent | None) -> Built:
     """The chain between two rails."""
-    extent = extent or constant_extent(0.0, 1.0)
     sound(first, "rails[0]")
     sound(second, "rails[1]")
-    first, second = joined(first, second)
-    patches = (_rungs(a, b, extent) for a, b in zip(first.pieces(), second.pieces(), strict=True))
+    patches = ladder(first, second, extent or constant_extent(0.0, 1.0))
     return one_panel(patches, first.closed and second.closed)
+
+
+def ladder(first: Curve, second: Curve, extent: Extent) -> tuple[Patch, ...]:
+    """The rulings between two sound rails at equal fractions, a patch for each smooth piece.
+
+    Raises:
+        GeometryError: the rails meet.
+    """
+    first, second = joined(first, second)
+    pieces = zip(first.pieces(), second.pieces(), strict=True)
+    return tuple(_rungs(a, b, extent) for a, b in pieces)
 
 
 def _rungs(first: Curve, second: Curve, extent: Extent) -> Patch:

@@ -37,25 +37,41 @@ def grid(curve: Curve) -> Array:
     return np.concatenate(runs)
 
 
-def lowest(value: Scalar, curve: Curve) -> tuple[float, float]:
-    """The parameter at which a smooth scalar is smallest along the curve, and its value.
+def dips(value: Scalar, curve: Curve) -> Array:
+    """The parameters inside the curve at which a smooth scalar has a minimum, increasing.
 
-    A minimum inside is found where the slope changes sign, so that an isolated zero of a square
-    is met to rounding and not only to the square root of it.
+    Each is found where the slope changes sign, so that an isolated zero of a square is met to
+    rounding and not only to the square root of it.
     """
+    return _bottoms(value, grid(curve))[0]
+
+
+def lowest(value: Scalar, curve: Curve) -> tuple[float, float]:
+    """The parameter at which a smooth scalar is smallest along the curve, and its value: one of
+    its ``dips``, an end or a break."""
     t = grid(curve)
+    inside, series = _bottoms(value, t)
+    at = np.concatenate([t, inside])
+    values = np.concatenate([series[0], value(inside, 0)[0]])
+    best = int(np.argmin(values))
+    return float(at[best]), float(values[best])
+
+
+def _bottoms(value: Scalar, t: Array) -> tuple[Array, Array]:
+    """The minima between the parameters t (n,), and the scalar's series (2, n) at these."""
     series = value(t, 1)
-    dips = np.flatnonzero((series[1, :-1] < 0.0) & (series[1, 1:] > 0.0))
-    low, high = t[dips], t[dips + 1]
-    if dips.size:
+    sloping = np.flatnonzero(series[1])  # a sample may be the minimum itself
+    slopes = series[1, sloping]
+    falling = np.flatnonzero((slopes[:-1] < 0.0) & (slopes[1:] > 0.0))
+    low, high = t[sloping[falling]], t[sloping[falling + 1]]
+    if falling.size:
         for _ in range(BISECTIONS):
             middle = 0.5 * (low + high)
             falls = value(middle, 1)[1] < 0.0
             low, high = np.where(falls, middle, low), np.where(falls, high, middle)
-    at = np.concatenate([t, low, high])
-    values = np.concatenate([series[0], value(np.concatenate([low, high]), 0)[0]])
-    best = int(np.argmin(values))
-    return float(at[best]), float(values[best])
+    ends = np.stack([low, high])
+    lower = np.argmin(value(ends.ravel(), 0)[0].reshape(ends.shape), axis=0)
+    return np.asarray(np.take_along_axis(ends, lower[None], axis=0)[0]), series
 
 
 def crossing(value: Scalar, curve: Curve) -> float:
