@@ -20,7 +20,7 @@ from devcad.interrupts import Interrupts
 from devcad.outcomes import work_through
 
 if TYPE_CHECKING:
-    from devcad.geometry.analysis import Analysis
+    from devcad.geometry.analysis.analysis import Analysis
     from devcad.job.load import Job
     from devcad.pipeline import Progress
 
@@ -190,7 +190,7 @@ def analyze(
 def _analysis(file: str, out: str) -> tuple[list[tuple[str, Analysis]], str]:
     """The curves of a file by their keys, what they are, and the path of the figure."""
     from devcad.export.folder import publish_file
-    from devcad.geometry.analysis import analyze as analysed
+    from devcad.geometry.analysis.analysis import analyze as analysed
     from devcad.job.analysis import load_curves
     from devcad.report.analysis import figure_subtitle
     from devcad.report.figure import figure

@@ -525,7 +525,7 @@ REFUSED = {
     "a family that closes with its normal reversed": (
         'kind = "envelope"\nnormal = ["cos(t/2)*cos(t)", "cos(t/2)*sin(t)", "sin(t/2)"]\n'
         'offset = "0.3*cos(t/2)"\nt = [0, "2*pi"]\nextent = [1, 2]',
-        "the front turns over",
+        "crosses the regression curve",
     ),
     "tangent planes along an asymptotic line": (
         'kind = "tangent-planes"\nbase = { x = "u", y = "v", z = "u*v" }\n'
@@ -634,10 +634,10 @@ REFUSED = {
         'kind = "edge-surface"\ncurves = [{ kind = "ellipse", radii = [3, 2] }]',
         "lies in a plane",
     ),
-    "the hull of two circles that meet": (
-        'kind = "edge-surface"\ncurves = [{ kind = "circle", radius = 1 }, '
-        '{ kind = "circle", radius = 1, normal = [1, 0, 0] }]',
-        "the curves meet",
+    "the hull of two circles that touch": (
+        'kind = "edge-surface"\ncurves = [{ kind = "circle", radius = 1, center = [1, 0, 0] }, '
+        '{ kind = "circle", radius = 1, center = [0, 0, 1], normal = [1, 0, 0] }]',
+        "the curves touch",
     ),
 }
 """Name -> ([surface] table, words of the refusal): exit 3 and no files."""

@@ -15,7 +15,7 @@ import pytest
 from test_job import as_pattern, expectation
 
 from devcad.cli import run
-from devcad.geometry.analysis import analyze
+from devcad.geometry.analysis.analysis import analyze
 from devcad.job.analysis import load_curves
 from devcad.report.analysis import figure_subtitle
 from devcad.report.figure import figure

@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from devcad.geometry.analysis import Analysis
-from devcad.geometry.attached import Attached
-from devcad.geometry.helices import KINDS, Ratio
+from devcad.geometry.analysis.analysis import Analysis
+from devcad.geometry.analysis.attached import Attached
+from devcad.geometry.analysis.helices import KINDS, Ratio
+from devcad.geometry.analysis.traces import RATIOS
 from devcad.geometry.taylor import Array
-from devcad.geometry.traces import RATIOS
 
 MOST_POINTS = 6
 """Singular points of one developable that the table shows."""

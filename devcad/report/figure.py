@@ -10,10 +10,10 @@ from xml.sax.saxutils import escape
 
 import numpy as np
 
-from devcad.geometry.analysis import Analysis
-from devcad.geometry.helices import Ratio
+from devcad.geometry.analysis.analysis import Analysis
+from devcad.geometry.analysis.helices import Ratio
+from devcad.geometry.analysis.traces import RATIOS
 from devcad.geometry.taylor import Array
-from devcad.geometry.traces import RATIOS
 
 WIDTH, HEIGHT = 960.0, 800.0  # px
 LEFT, RIGHT = 86.0, 936.0  # of the plots

@@ -11,12 +11,12 @@ from pydantic import TypeAdapter
 from scipy.spatial import ConvexHull
 
 from devcad.flatten.development import develop_chain
-from devcad.geometry.bitangent import Pairs
+from devcad.geometry.bitangents.bitangent import Pairs
+from devcad.geometry.bitangents.families import families
+from devcad.geometry.bitangents.monotone import pieces
+from devcad.geometry.bitangents.rails import rail
 from devcad.geometry.chain import link
 from devcad.geometry.curves import CurveSpec
-from devcad.geometry.families import families
-from devcad.geometry.monotone import pieces
-from devcad.geometry.rails import rail
 from devcad.geometry.regularity import warp
 
 CURVE = TypeAdapter(CurveSpec)
@@ -391,6 +391,7 @@ def test_a_curve_that_passes_a_point_twice_has_two_parts_of_its_cubic_cylinder()
     assert [min(heights), max(heights)] == pytest.approx([-1.0, 1.0], abs=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("specs", "number"), [([EIGHT], 3), ([CROSSING_SPLINE], 3), (GREAT_CIRCLES, 4), (LENS, 1)]
 )
@@ -460,6 +461,7 @@ def flat_faces(panels):
     return total
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("seed", "number", "noise"),
     [

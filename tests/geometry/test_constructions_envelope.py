@@ -268,6 +268,7 @@ def test_impossible_families_end_in_one_line(table, error, words):
     assert told.remedy
 
 
+@pytest.mark.slow
 @given(st.floats(-12, -1), st.sampled_from([-1.0, 1.0]))
 def test_a_near_moment_of_rest_is_exact_or_refused(exponent, sign):
     """n' = 3 t^2 + eps: eps > 0 never stands still, eps < 0 turns back twice; whatever is built

@@ -99,6 +99,7 @@ def test_from_outside_d_passes_through_c_where_the_line_is_a_tangent(on, more, p
     np.testing.assert_allclose(found[0, len(steps)], c, atol=1e-13)
 
 
+@pytest.mark.slow
 @given(st.floats(-0.5, 0.5), st.floats(-0.5, 0.5), st.floats(-0.5, 0.5))
 def test_the_midpoints_on_a_quadric_lie_on_a_homothetic_one(x, y, z):
     """Q(E) = B(E, A)."""

@@ -191,6 +191,7 @@ def test_starts_and_senses_of_closed_rails_do_not_matter():
     np.testing.assert_allclose(areas, areas[0], rtol=1e-8)  # of the quadrature, on other panels
 
 
+@pytest.mark.slow
 @settings(max_examples=15, deadline=None)
 @given(
     scale=st.sampled_from([1e-3, 1.0, 1e4]),
@@ -278,6 +279,7 @@ def test_where_none_exists_the_least_warp_is_told(rails):
     assert loft(rails=rails).figures["warp_deg"].value == pytest.approx(expected, rel=0.02)
 
 
+@pytest.mark.slow
 def test_a_rail_that_may_move_makes_a_developable():
     panel = loft(rails=BOWED, relax="rail-b", relax_max=20)
     assert panel.figures["warp_deg"].value <= 1e-6

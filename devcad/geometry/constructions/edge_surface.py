@@ -9,20 +9,21 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from devcad.errors import GeometryError, JobError
-from devcad.geometry import monotone, taylor
-from devcad.geometry.bitangent import Pairs
-from devcad.geometry.branches import Filled, Path
+from devcad.geometry import taylor
+from devcad.geometry.bitangents import monotone
+from devcad.geometry.bitangents.bitangent import Pairs
+from devcad.geometry.bitangents.branches import Filled, Path
+from devcad.geometry.bitangents.families import families
+from devcad.geometry.bitangents.monotone import Piece
+from devcad.geometry.bitangents.rails import Rail, rail
+from devcad.geometry.bitangents.supporting import supported
+from devcad.geometry.bitangents.zeroset import Unresolved
 from devcad.geometry.constructions.base import Built, BuiltPanel, Closable, smooth
 from devcad.geometry.constructions.segments import reversed_
 from devcad.geometry.curve import Curve, angles
 from devcad.geometry.curves import Count, CurveSpec, Flag
-from devcad.geometry.families import families
-from devcad.geometry.monotone import Piece
 from devcad.geometry.patch import Patch, RulingJet
-from devcad.geometry.rails import Rail, rail
-from devcad.geometry.supporting import supported
 from devcad.geometry.taylor import Array
-from devcad.geometry.zeroset import Unresolved
 
 REFINED = 2
 """How often the grid is doubled before a surface is given up."""
@@ -41,6 +42,7 @@ class EdgeSurface(Closable):
     c0 = the pair's point on the first curve, e towards the other, v from 0 to their distance;
     t begins with the first curve's parameter and grows by half of what both parameters move (the
     second's scaled to the first's domain). Where a point stands still one patch ends.
+    Where the curves meet, a ruling has no length: one panel ends there in a tip, another begins.
 
     Source: geometry.md, section 6.
     """
@@ -65,7 +67,7 @@ class EdgeSurface(Closable):
         Raises:
             JobError: there is no such component.
             GeometryError: there are no bitangent pairs, or more than curves of them; a curve has
-                corners; the two ends of a ruling coincide.
+                corners; the curves touch.
         """
         names = ["curves[0]", "curves[1]"] if len(self.curves) == 2 else ["curves"]
         curves = [

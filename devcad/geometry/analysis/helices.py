@@ -13,8 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from devcad.geometry.analysis.traces import RATIOS, Traces
 from devcad.geometry.taylor import Array
-from devcad.geometry.traces import RATIOS, Traces
 
 KINDS = ("cylindrical", "slant", "clad", "g_clad")
 """The helix whose ratio of ``RATIOS`` is constant."""

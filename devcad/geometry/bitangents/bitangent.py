@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from devcad.geometry import taylor
-from devcad.geometry.rails import Rail
+from devcad.geometry.bitangents.rails import Rail
 from devcad.geometry.taylor import Array
 
 

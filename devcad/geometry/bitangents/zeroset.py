@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from devcad.geometry.nodes import Height, Node, nodes, solved
+from devcad.geometry.bitangents.nodes import Height, Node, nodes, solved
 from devcad.geometry.taylor import Array
 
 HALVINGS = 24

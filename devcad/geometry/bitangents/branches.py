@@ -13,11 +13,11 @@ from itertools import pairwise
 
 import numpy as np
 
-from devcad.geometry.bitangent import Pairs
-from devcad.geometry.nodes import Node
-from devcad.geometry.rails import Rail, complexity
+from devcad.geometry.bitangents.bitangent import Pairs
+from devcad.geometry.bitangents.nodes import Node
+from devcad.geometry.bitangents.rails import Rail, complexity
+from devcad.geometry.bitangents.zeroset import Branch, Grid, Unresolved
 from devcad.geometry.taylor import Array
-from devcad.geometry.zeroset import Branch, Grid, Unresolved
 
 LINES = (120, 560)
 """The fewest and the most lines of the grid in one direction, before it is refined."""

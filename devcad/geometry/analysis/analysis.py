@@ -8,20 +8,20 @@ from dataclasses import dataclass
 import numpy as np
 
 from devcad.geometry import taylor
-from devcad.geometry.attached import Attached, developables
-from devcad.geometry.constructions.sampling import dips
-from devcad.geometry.curve import Curve
-from devcad.geometry.curves import CurveModel
-from devcad.geometry.degrees import (
+from devcad.geometry.analysis.attached import Attached, developables
+from devcad.geometry.analysis.degrees import (
     degree_of_edge_surface,
     degree_of_tangent_developable,
     is_plane,
     rational_degree,
 )
+from devcad.geometry.analysis.helices import Ratio, helix_class, ratios
+from devcad.geometry.analysis.traces import LIGHT, RATIOS, Traces, trace
+from devcad.geometry.constructions.sampling import dips
+from devcad.geometry.curve import Curve
+from devcad.geometry.curves import CurveModel
 from devcad.geometry.frames import LORENTZ
-from devcad.geometry.helices import Ratio, helix_class, ratios
 from devcad.geometry.taylor import Array
-from devcad.geometry.traces import LIGHT, RATIOS, Traces, trace
 
 SPACE = 3
 """The lowest degree of a curve that leaves the plane."""

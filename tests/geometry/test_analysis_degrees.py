@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from pydantic import TypeAdapter
 
-from devcad.geometry.curves import CurveSpec
-from devcad.geometry.degrees import (
+from devcad.geometry.analysis.degrees import (
     degree_of_edge_surface,
     degree_of_tangent_developable,
     is_plane,
     rational_degree,
 )
+from devcad.geometry.curves import CurveSpec
 
 ADAPTER: TypeAdapter[Any] = TypeAdapter(CurveSpec)
 TURN = [0, "2*pi"]

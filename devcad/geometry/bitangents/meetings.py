@@ -12,12 +12,12 @@ from itertools import pairwise
 import numpy as np
 
 from devcad.errors import GeometryError
-from devcad.geometry import branches
-from devcad.geometry.bitangent import Pairs
-from devcad.geometry.branches import Path
-from devcad.geometry.nodes import Node, node_at
+from devcad.geometry.bitangents import branches
+from devcad.geometry.bitangents.bitangent import Pairs
+from devcad.geometry.bitangents.branches import Path
+from devcad.geometry.bitangents.nodes import Node, node_at
+from devcad.geometry.bitangents.zeroset import Unresolved
 from devcad.geometry.taylor import Array
-from devcad.geometry.zeroset import Unresolved
 
 COINCIDE = 1e-9
 """A ruling below this share of the curves' size has no length."""

@@ -10,12 +10,12 @@ from itertools import pairwise
 
 import numpy as np
 
-from devcad.geometry import branches, zeroset
-from devcad.geometry.bitangent import Pairs
-from devcad.geometry.branches import Path, linear, meet
-from devcad.geometry.meetings import ending, parted
+from devcad.geometry.bitangents import branches, zeroset
+from devcad.geometry.bitangents.bitangent import Pairs
+from devcad.geometry.bitangents.branches import Path, linear, meet
+from devcad.geometry.bitangents.meetings import ending, parted
+from devcad.geometry.bitangents.zeroset import Grid
 from devcad.geometry.taylor import Array
-from devcad.geometry.zeroset import Grid
 
 
 def families(pairs: Pairs, refined: int = 0) -> list[Path]:

@@ -13,8 +13,8 @@ from pydantic import TypeAdapter
 
 from devcad.errors import GeometryError, JobError
 from devcad.geometry import taylor
-from devcad.geometry.analysis import Analysis, analyze
-from devcad.geometry.attached import Attached
+from devcad.geometry.analysis.analysis import Analysis, analyze
+from devcad.geometry.analysis.attached import Attached
 from devcad.geometry.chebyshev import resolve
 from devcad.geometry.curve import Curve
 from devcad.geometry.curves import CurveSpec

@@ -15,6 +15,7 @@ import numpy as np
 
 from devcad.errors import GeometryError, JobError
 from devcad.geometry import taylor
+from devcad.geometry.analysis.traces import Traces, knots
 from devcad.geometry.classify import Shape, classify, sample_parameters
 from devcad.geometry.constructions import SURFACES
 from devcad.geometry.constructions.base import constant_extent
@@ -24,7 +25,6 @@ from devcad.geometry.curve import Curve, samples, size
 from devcad.geometry.patch import Patch
 from devcad.geometry.regularity import singularities
 from devcad.geometry.taylor import Array
-from devcad.geometry.traces import Traces, knots
 
 KINDS = ("tangent", "rectifying", "darboux", "principal-normal-darboux", "focal")
 """In the order of geometry.md, section 2."""

@@ -12,9 +12,9 @@ import itertools
 import numpy as np
 
 from devcad.geometry import chebyshev, taylor
-from devcad.geometry.bitangent import Pairs
-from devcad.geometry.monotone import Piece
-from devcad.geometry.rails import Rail
+from devcad.geometry.bitangents.bitangent import Pairs
+from devcad.geometry.bitangents.monotone import Piece
+from devcad.geometry.bitangents.rails import Rail
 from devcad.geometry.taylor import Array, rows_dot
 
 POINTS = 768

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from devcad.geometry import taylor
-from devcad.geometry.zeroset import Grid, Unresolved, branches
+from devcad.geometry.bitangents.zeroset import Grid, Unresolved, branches
 
 
 class Polynomial:

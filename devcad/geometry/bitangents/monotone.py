@@ -18,12 +18,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from devcad.geometry import chebyshev, taylor
-from devcad.geometry.bitangent import Pairs
-from devcad.geometry.branches import Path, linear, meet, spans
+from devcad.geometry.bitangents.bitangent import Pairs
+from devcad.geometry.bitangents.branches import Path, linear, meet, spans
+from devcad.geometry.bitangents.rails import Rail
+from devcad.geometry.bitangents.zeroset import Unresolved
 from devcad.geometry.chebyshev import Function, Piecewise
-from devcad.geometry.rails import Rail
 from devcad.geometry.taylor import Array
-from devcad.geometry.zeroset import Unresolved
 
 TERMS = 9
 """Coefficients of the series at a node."""
