@@ -281,6 +281,6 @@ def _refuse_thick_apex(shapes: tuple[Shape, ...], apex: tuple[bool, ...]) -> Non
             raise GeometryError(
                 "regular: the layers of a thick sheet end apart from one another at the apex of "
                 "a cone that is not a right circular one",
-                remedy="begin the extent a little above the apex, or give the part no thickness: "
-                "the pattern of its middle is the same",
+                remedy="keep the sheet off the apex (a shorter extent, a rounded corner, trim), or "
+                "give the part no thickness: the pattern of its middle is the same",
             )

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from devcad.assemble import PanelSpec, assemble
-from devcad.checks import FOLLOWS, require
+from devcad.checks import FOLLOWS, Check, at_most, require
 from devcad.errors import DevcadError, FileError
 from devcad.export import DEFAULT_FORMATS, Options, Written, writer
 from devcad.export.folder import REPORT, published, unwritable
@@ -129,12 +129,26 @@ def export(
         if MESHES.intersection(chosen):
             solids = (panel for panel in part.panels if panel.mesh.watertight)
             checks += [mesh_volume(panel, part.tolerance) for panel in solids]
+        checks += [_near_enough(file, part) for file in written if file.format in MESHES]
         require(checks, allowed)
         origin = _svg_origin(part) if "svg" in chosen else None
         report = make_report(part, checks=checks, files=written, svg_origin=origin)
         with _naming(target, REPORT):
             (folder / REPORT).write_bytes(to_bytes(report))
     return report
+
+
+def _near_enough(file: Written, part: Part) -> Check:
+    """That a mesh keeps the tolerance in its file too, whose numbers are single precision."""
+    return at_most(
+        "mesh-deviation",
+        "",
+        file.max_deviation,
+        part.tolerance,
+        "mm",
+        says=f"{file.path.name} is {file.max_deviation:.3g} mm off: its numbers have 24 bits",
+        remedy="place the part nearer to the origin, or raise the tolerance",
+    )
 
 
 @contextmanager

@@ -201,15 +201,22 @@ def _share(stations: list[_Stations], chain: Chain) -> None:
         _take_over(before, -1, after, 0)
     if chain.closed:
         _take_over(stations[0], 0, stations[-1], -1)
+        for end in (0, 1):  # a rail that is one point hands the seam's on to the one before
+            for before, after in reversed(list(itertools.pairwise(stations))):
+                if not after.collapsed(end):
+                    break
+                _take_over(after, 0, before, -1, (end,))
 
 
 def _merged(ids: NDArray[np.int64], *, collapsed: bool) -> Index:
     return np.asarray(np.where(collapsed, ids[0], ids), dtype=np.int32)
 
 
-def _take_over(source: _Stations, i: int, target: _Stations, j: int) -> None:
+def _take_over(
+    source: _Stations, i: int, target: _Stations, j: int, ends: tuple[int, ...] = (0, 1)
+) -> None:
     for layer, (theirs, ours) in enumerate(zip(source.points, target.points, strict=True)):
-        for end in (0, 1):
+        for end in ends:
             if target.collapsed(end):  # the whole rail is this one point
                 ours[end][:] = theirs[end][i]
                 target.ids[layer][end][:] = source.ids[layer][end][i]

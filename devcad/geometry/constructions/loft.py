@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -12,7 +13,7 @@ from devcad.errors import GeometryError, JobError
 from devcad.geometry.constructions.base import Built, Closable, Figure, one_panel, sound
 from devcad.geometry.curve import Curve
 from devcad.geometry.curves import CurveSpec, Flag, Number, Positive
-from devcad.geometry.loft.loft import Lofted, creases, lofted
+from devcad.geometry.loft.loft import Lofted, creases, lofted, reversed_curve
 from devcad.geometry.loft.relax import MODES, relaxed
 from devcad.geometry.rail_fit import RailFit
 from devcad.geometry.regularity import clearance, twist
@@ -23,6 +24,12 @@ EXACT = 1e-6
 """A warp below this, in degrees, is one of rounding."""
 CROSSED = 0.95
 """Beyond this |u - v| the rulings run from one rail's end to the other's opposite end."""
+LOOKED = 2049
+TORN = 1e-8
+APART = 1e-9
+"""Rails that come nearer than this share of their size meet."""
+MISSED = 5e-3
+"""Share of its length by which a fixed ruling may lie beside the nearest of 2049 that are seen."""
 FOLDED = 0.1
 """A crease below this, in degrees, is none (design.md, section 7)."""
 KINDS = ("strip", "fan", "plane", "quasi")
@@ -72,11 +79,19 @@ class Loft(Closable):
         sound(second, "rails[1]")
         if not (first.closed and second.closed):
             first, second = (replace(curve, closed=False) for curve in (first, second))
+        _require_apart(first, second)
         through = self._through(first, second)
         best = _best(first, second, self.fans, self.trim, through)
         moved = None
         if not best.exact and self.relax is not None:
             best, moved = self._relaxed(first, second, best)
+        if best.torn:
+            raise GeometryError(
+                "no developable joins these rails, and nothing that comes near one was found",
+                value=best.warp,
+                limit=EXACT,
+                remedy='bring their shapes nearer together, or let one move: relax = "rail-b"',
+            )
         if best.made.closed and best.warp > HOPELESS:
             raise GeometryError(
                 "the closed rails have no closed matching: on the best way through them the "
@@ -86,6 +101,7 @@ class Loft(Closable):
                 remedy="whole circles that wrap into one another are an oloid or an edge-surface; "
                 "for a loft give arcs of them",
             )
+        _require_rulings(best, through, first, second)
         folds = creases(best.made)
         advice = "" if best.exact else self._advice(first, second, best)
         return one_panel(
@@ -113,7 +129,16 @@ class Loft(Closable):
                         limit=high,
                         remedy="give the rails' own parameters",
                     )
-        return tuple(sorted(self.rulings))
+        kept = tuple(sorted(self.rulings))
+        for before, after in pairwise(kept):
+            if not (before[0] < after[0] and before[1] < after[1]) and not first.closed:
+                raise JobError(
+                    f"rulings: {list(before)} and {list(after)} cross",
+                    value=after[1],
+                    limit=before[1],
+                    remedy="give rulings whose parameters grow together on both rails",
+                )
+        return kept
 
     def _relaxed(self, first: Curve, second: Curve, best: _Found) -> tuple[_Found, float]:
         """The loft after moving a rail, and how far it was moved."""
@@ -140,7 +165,11 @@ class Loft(Closable):
     def _advice(self, first: Curve, second: Curve, best: _Found) -> str:
         """What came nearest to a developable, and what may help."""
         open_rails = not best.made.closed
+        if open_rails and _found(first, reversed_curve(second), best.fans, False, ()).exact:
+            return "rails[1] runs against rails[0]: turn it round, then a developable joins them"
         other = _found(first, second, not best.fans, False, ()) if open_rails else None
+        if other is not None and other.exact and other.fans:
+            return "with fans about the ends of the rails there is one: leave out fans = false"
         said = []
         for found in (best, other):
             if found is not None:
@@ -151,6 +180,60 @@ class Loft(Closable):
             f"no developable joins these rails ({least}); "
             'let one move: relax = "rail-b", or bring their shapes nearer to one another'
         )
+
+
+def _require_apart(first: Curve, second: Curve) -> None:
+    """Raise a GeometryError where the rails meet, or lie in one plane: no sheet is to be found."""
+    t, s = (np.linspace(*curve.domain, LOOKED) for curve in (first, second))
+    here, there = first.point(t), second.point(s)
+    both = np.concatenate([here, there])
+    size = float(np.linalg.norm(np.ptp(both, axis=0)))
+    for curve, own, others in ((first, t, there), (second, s, here)):
+        points = curve.point(own)
+        away = np.linalg.norm(points[:, None] - others[None, :: LOOKED // 64], axis=2)
+        k = int(np.argmin(away.min(axis=1)))
+        if away[k].min() <= APART * size:
+            raise GeometryError(
+                f"the rails meet at t = {own[k]:.6g} of rails[{0 if curve is first else 1}]",
+                value=float(away[k].min()),
+                limit=APART * size,
+                remedy="end one of them before that point",
+            )
+    flat = np.linalg.svd(both - both.mean(axis=0), compute_uv=False)[-1]
+    straight = np.linalg.svd(here - here.mean(axis=0), compute_uv=False)[1]
+    if flat <= APART * size * np.sqrt(len(both)) and straight > APART * size:
+        raise GeometryError(
+            "both rails lie in one plane, so that what is between them is flat already",
+            value=float(flat),
+            remedy="a flat sheet needs no loft; lift one of the rails",
+        )
+
+
+def _require_rulings(
+    found: _Found, through: tuple[tuple[float, float], ...], first: Curve, second: Curve
+) -> None:
+    """Raise a GeometryError where a ruling that must be among them is not one of the surface."""
+    for u, v in through:
+        start, end = first.point(np.array([u]))[0], second.point(np.array([v]))[0]
+        size = float(np.linalg.norm(end - start))
+        missed = min(
+            float(
+                (
+                    np.linalg.norm(jet.c0[0] - start, axis=1)
+                    + np.linalg.norm(jet.rail(jet.v_to)[0] - end, axis=1)
+                ).min()
+            )
+            for patch in found.made.patches
+            for jet in [patch.jet(np.linspace(*patch.domain, LOOKED), 0)]
+        )
+        if missed > MISSED * size:
+            raise GeometryError(
+                f"rulings: the one from {u:.6g} to {v:.6g} is none of the developable through the "
+                f"rails: its nearest ruling ends {missed:.4g} beside it",
+                value=missed,
+                limit=MISSED * size,
+                remedy="leave it out, or choose the parameters of a ruling that the report shows",
+            )
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,7 +251,20 @@ class _Found:
     def exact(self) -> bool:
         """Whether it is developable, folds nowhere by itself, and is a sheet from rail to rail: not
         two fans about opposite ends, which any two open rails have."""
-        return self.warp <= EXACT and self.crease <= FOLDED and not self.crossed
+        smooth = self.warp <= EXACT and self.crease <= FOLDED
+        return smooth and not self.crossed and not self.torn
+
+    @property
+    def torn(self) -> bool:
+        """Whether its parts do not join: what was found is no sheet."""
+        ends = [patch.jet(patch.domain, 0) for patch in self.made.patches]
+        for before, after in pairwise(ends):
+            bases = before.c0[0, 1] - after.c0[0, 0]
+            tops = before.rail(before.v_to)[0, 1] - after.rail(after.v_to)[0, 0]
+            size = self.made.rails[0].size
+            if max(np.linalg.norm(bases), np.linalg.norm(tops)) > TORN * size:
+                return True
+        return not np.isfinite(self.warp)
 
     @property
     def crossed(self) -> bool:
@@ -199,7 +295,8 @@ def _best(
     if found.exact or not fans or found.made.closed:
         return found
     plain = _found(first, second, False, trim, through)
-    return plain if found.crossed or plain.warp < max(found.warp, found.crease) else found
+    worse = found.crossed or found.torn or plain.warp < max(found.warp, found.crease)
+    return plain if worse and not plain.torn else found
 
 
 def _found(

@@ -23,10 +23,10 @@ SAME = 1e-9
 """Two coordinates that differ by less are one."""
 
 
-def completed(a: Rail, b: Rail, path: Path, rough: Path) -> Path:
+def completed(a: Rail, b: Rail, path: Path, rough: Path, *, fans: bool) -> Path:
     """The path with roots given up that no monotone path joins: there it is the ``rough`` one.
-    On open rails its longest solved run is carried on to the border of the square, from where a
-    fan is exact."""
+    With ``fans``, on open rails, its longest solved run is carried on to the border of the square,
+    from where a fan is exact."""
     sums, x = path.u + path.v, path.u - path.v
     steady = np.abs(np.diff(x)) <= STEEPEST * np.diff(sums) + 1e-12
     runs = _compatible(_runs(path.solved[1:] & path.solved[:-1] & steady), sums, x)
@@ -34,8 +34,8 @@ def completed(a: Rail, b: Rail, path: Path, rough: Path) -> Path:
     for low, high in runs:
         kept[low : high + 1] = True
     x = np.where(kept, x, np.interp(sums, rough.u + rough.v, rough.u - rough.v))
-    if not runs or (a.closed and b.closed):
-        return _rebuilt(a, b, sums, x, kept)
+    if not runs or not fans or (a.closed and b.closed):
+        return _rebuilt(a, b, sums, x, kept, fans=fans)
     low, high = max(runs, key=lambda run: run[1] - run[0])
     ends = []
     for start, step in ((low, -1), (high, +1)):
@@ -50,12 +50,14 @@ def completed(a: Rail, b: Rail, path: Path, rough: Path) -> Path:
     return _bordered(a, b, sums, x, kept, ends)
 
 
-def _rebuilt(a: Rail, b: Rail, sums: Array, x: Array, kept: NDArray[np.bool_]) -> Path:
+def _rebuilt(
+    a: Rail, b: Rail, sums: Array, x: Array, kept: NDArray[np.bool_], *, fans: bool
+) -> Path:
     """The path of these places, what is not solved kept monotone between what is."""
     x = _monotone(sums, x, kept)
     u, v = 0.5 * (sums + x), 0.5 * (sums - x)
     marks = _turns(u, v, kept)
-    if not (a.closed and b.closed):  # along the border there are fans, solved or not
+    if fans and not (a.closed and b.closed):  # along the border there are fans, solved or not
         for edge in (u <= SAME, v <= SAME, u >= 1.0 - SAME, v >= 1.0 - SAME):
             marks += _turns(u, v, edge)
     return Path(u, v, kept, warp_at(a, b, u, v), marks)

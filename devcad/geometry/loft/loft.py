@@ -63,7 +63,7 @@ def lofted(
         start = b.spans[0].parameter(float(rough.v[0]) % 1.0)
         b = blown_up(rooted(second, start))
         rough = search(a, b, fans=fans)
-    path = completed(a, b, polished(a, b, rough, SEEDS), rough)
+    path = completed(a, b, polished(a, b, rough, SEEDS), rough, fans=fans)
     parts = stretches(a, b, path)
     if trim and not closed:
         parts = _trimmed(parts)
@@ -93,12 +93,15 @@ def _area_vector(curve: Curve) -> Array:
 def reversed_curve(curve: Curve) -> Curve:
     """The curve run from its end to its start."""
     low, high = curve.domain
-    inner = (*curve.breaks, *curve.corners)
+    knots = np.array(sorted((low, *curve.breaks, *curve.corners, high)))
+    turned = (low + high - knots)[::-1]
+    tops = np.append(np.nextafter(knots[1:-1], -np.inf), knots[-1])
 
     def jet(t: Array, order: int) -> Array:
-        s = low + high - t
-        for x in inner:  # there the jet must be that of the part to the right, now to the left
-            s = np.where(s == x, np.nextafter(x, low), s)
+        # which piece answers is decided here: at a knot the one to the right, there to the left
+        piece = np.searchsorted(turned[1:-1], t, side="right")
+        own = len(knots) - 2 - piece
+        s = np.clip(low + high - t, knots[own], tops[own])
         signs = (-1.0) ** np.arange(order + 1)[:, None, None]
         return np.asarray(signs * curve.jet(s, order))
 
