@@ -4,6 +4,9 @@
     devcad.export(part, "out", formats=["step", "dxf"])
     part.panels[0].pattern.area
 
+A face of build123d unrolls with ``devcad.unroll(face)``; parts become build123d objects in
+``devcad.interop``.
+
 Importing this package loads neither numpy nor any other large library.
 """
 
@@ -27,6 +30,7 @@ from devcad.errors import (
 if TYPE_CHECKING:
     from devcad.checks import Check as Check
     from devcad.export import Options as Options
+    from devcad.interop import unroll as unroll
     from devcad.job.load import Job as Job
     from devcad.job.load import load as load
     from devcad.part import Panel as Panel
@@ -49,6 +53,7 @@ __all__ = [
     "build",
     "export",
     "load",
+    "unroll",
 ]
 
 _LATER = {
@@ -58,6 +63,7 @@ _LATER = {
     "Panel": "devcad.part",
     "Part": "devcad.part",
     "load": "devcad.job.load",
+    "unroll": "devcad.interop",
 }
 
 
@@ -94,6 +100,8 @@ def export(
 
 def __getattr__(name: str) -> Any:
     """The names that need a large library, loaded when they are used."""
+    if name == "interop":
+        return import_module("devcad.interop")
     if name not in _LATER:
         raise AttributeError(f"module 'devcad' has no attribute '{name}'")
     return getattr(import_module(_LATER[name]), name)

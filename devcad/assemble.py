@@ -14,13 +14,17 @@ import numpy as np
 
 from devcad.checks import FOLLOWS, Check, require
 from devcad.errors import DevcadError, GeometryError
-from devcad.facts import panel_facts, rail_facts, strain
+from devcad.facts import neutral_figures, panel_facts, rail_facts, strain
+from devcad.features import Features, Seam
 from devcad.flatten.bend import bent
-from devcad.flatten.development import Development, develop_chain
+from devcad.flatten.blank import Blank, lay_flat
+from devcad.flatten.laying import laid
 from devcad.flatten.lorentz import Spacetime
-from devcad.flatten.outline import lay_out
+from devcad.flatten.neutral import Fibre
+from devcad.flatten.outline import lay_out, sheet_area
 from devcad.geometry.chain import SMOOTH, Chain, cut_at, link, with_gap
 from devcad.geometry.classify import Shape, classify, patch_box
+from devcad.geometry.cuts import Cut, opened
 from devcad.geometry.drawing import Drawing, carried
 from devcad.geometry.layers import at_apex, layer_gaps, straight_sided
 from devcad.geometry.parallel import parallel_chain
@@ -28,10 +32,14 @@ from devcad.geometry.patch import Patch
 from devcad.geometry.rail_fit import RailFit
 from devcad.geometry.rulings import place
 from devcad.geometry.taylor import Array
+from devcad.geometry.trimming import trimmed
 from devcad.mesh.build import build_mesh
 from devcad.mesh.mesh import Mesh
+from devcad.mesh.stations import Flat
 from devcad.part import Panel, Part
 from devcad.proofs import prove_pattern, prove_surface, volume_error
+from devcad.seams import joined
+from devcad.shop.limits import Bounds, limit_checks
 
 FLOAT32 = float(np.sqrt(3.0)) * 2.0**-24
 """Largest distance that rounding to float32 moves a point, per unit of its largest coordinate."""
@@ -39,6 +47,8 @@ ATTEMPTS = 4
 """How often the rulings are placed anew for the sake of a thick sheet's volume."""
 APART = 1e-6
 """Layers of neighbouring patches miss each other by more than this share of the thickness."""
+NOTHING = 1e-9
+"""A panel of which cutouts leave less than this share is gone."""
 STEEPEST_MITRE = np.radians(150.0)
 """A crease of a thick sheet beyond this has no sensible mitre (design.md, section 7)."""
 
@@ -63,6 +73,31 @@ class PanelSpec:
     figures: Mapping[str, float] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     rail_fit: RailFit | None = None
+    features: Features = field(default_factory=Features)
+
+
+@dataclass(frozen=True, slots=True)
+class Making:
+    """How panels are made: ``thickness`` of the sheet in mm, 0 for a surface; the ``reference``
+    face that the patches describe ("middle", "front" or "back"); the ``tolerance``, the largest
+    distance in mm of anything exported from the true surface; ``bend``, 0 flat to 1 bent.
+
+    ``fibre`` keeps its length when the sheet is bent: the pattern is its development, or the
+    middle's where it is None. ``limits`` are the shop's. ``allow`` names checks that may fail.
+    """
+
+    thickness: float = 0.0
+    reference: str = "middle"
+    tolerance: float = 0.05
+    bend: float = 1.0
+    fibre: Fibre | None = None
+    limits: Bounds = field(default_factory=Bounds)
+    allow: frozenset[str] = frozenset()
+
+    @property
+    def layers(self) -> tuple[float, ...]:
+        """The distances along n of what is meshed: both skins, or the surface."""
+        return (-0.5 * self.thickness, 0.5 * self.thickness) if self.thickness else (0.0,)
 
 
 def assemble(
@@ -73,61 +108,104 @@ def assemble(
     reference: str,
     tolerance: float,
     bend: float,
-    smallest_bend: float | None = None,
+    fibre: Fibre | None = None,
+    limits: Bounds | None = None,
+    seams: Sequence[Seam] = (),
     allow: frozenset[str] = frozenset(),
 ) -> Part:
     """The part made of these panels, with every geometric check it passed.
 
     Args:
-        thickness: of the sheet in mm, 0 for a surface.
-        reference: which face the patches describe: "middle", "front" or "back".
-        tolerance: the largest distance in mm of anything exported from the true surface.
-        bend: 0 flat to 1 bent; the pattern is the same for all.
-        smallest_bend: the material's smallest inside radius in mm, where one is known.
-        allow: names of checks that may fail.
+        thickness, reference, tolerance, bend, fibre, limits, allow: as in :class:`Making`. The
+            pattern is the same for every bend.
+        seams: the edges of the panels that are to meet.
     Raises:
         GeometryError, CheckFailed: with the panel's name.
     """
-    panels, checks = [], []
+    how = Making(thickness, reference, tolerance, bend, fibre, limits or Bounds(), allow)
+    made: list[Panel] = []
+    blanks: list[Blank] = []
+    checks: list[Check] = []
     for spec in specs:
         try:
-            panel, proven = _panel(
-                spec,
-                thickness=thickness,
-                reference=reference,
-                tolerance=tolerance,
-                bend=bend,
-                smallest_bend=smallest_bend,
-                allow=allow,
-            )
+            panel, blank, proven = _panel(spec, how)
         except DevcadError as error:
             if len(specs) > 1:
                 error.panel = error.panel or spec.name
             raise
-        panels.append(panel)
+        made.append(panel)
+        blanks.append(blank)
         checks += proven
+    panels, meetings, met = joined(
+        made,
+        [blank.middle for blank in blanks],
+        [blank.developments for blank in blanks],
+        seams,
+        reference=reference,
+        tolerance=tolerance,
+    )
+    require(met, allow)
+    checks += met
     if len(panels) == 1:  # a job of one panel need not be told which
         checks = [replace(check, panel=panels[0].name) for check in checks]
-    return Part(name, tuple(panels), thickness, tolerance, tuple(checks))
+    return Part(name, panels, thickness, tolerance, tuple(checks), seams=meetings)
 
 
-def _panel(
-    spec: PanelSpec,
-    *,
-    thickness: float,
-    reference: str,
-    tolerance: float,
-    bend: float,
-    smallest_bend: float | None,
-    allow: frozenset[str],
-) -> tuple[Panel, list[Check]]:
-    layers = (-0.5 * thickness, 0.5 * thickness) if thickness else (0.0,)
+@dataclass(frozen=True, slots=True)
+class _Stuff:
+    """The middle surface of a panel, proven: what its patches are and which reach an apex, what is
+    drawn on it, its features, and the checks that it passed."""
+
+    middle: Chain
+    shapes: tuple[Shape, ...]
+    apex: tuple[bool, ...]
+    drawings: tuple[Drawing, ...]
+    features: Features
+    checks: list[Check]
+
+
+def _panel(spec: PanelSpec, how: Making) -> tuple[Panel, Blank, list[Check]]:
     if spec.rail_fit is not None and spec.rail_fit.max_twist is not None:
-        allow |= set(FOLLOWS["twist"])  # who accepts a twist accepts what follows from it
-    described, drawings = _described(spec, tolerance)
+        # who accepts a twist accepts what follows from it
+        how = replace(how, allow=how.allow | set(FOLLOWS["twist"]))
+    stuff = _stuff(spec, how)
+    middle, blank = stuff.middle, lay_flat(stuff.middle, how.fibre)
+    cuts, marks = laid(stuff.features, blank.divided, blank.developments, blank.jumps)
+    chain = middle if how.bend == 1.0 else bent(blank, how.bend)
+    # what ran over the seam of a tube ends at the edges of the open sheet that it becomes
+    holes = opened(cuts, chain.patches) if middle.closed and not chain.closed else cuts
+    mesh, rulings = _meshed(chain, how, blank.points, holes)
+    drawings = (*stuff.drawings, *marks)
+    pattern = lay_out(
+        blank.chain, blank.developments, rulings, drawings, cuts, bending=middle.patches
+    )
+    shapes = stuff.shapes
+    shapes3d = shapes if how.bend == 1.0 else tuple(classify(patch) for patch in chain.patches)
+    panel = Panel(spec.name, spec.kind, chain, shapes3d, how.thickness, rulings, mesh, pattern)
+    panel = replace(panel, spacetime=_spacetime(spec, middle), cuts=holes, blank=blank)
+    if not blank.isometric:
+        panel = replace(panel, surface_area=sheet_area(chain, holes))
+    checks = stuff.checks + prove_pattern(panel, blank, tolerance=how.tolerance)
+    checks += limit_checks(panel, middle, how.fibre, how.limits)
+    require(checks, how.allow)
+    failed = sorted({check.name for check in checks if not check.passed})
+    facts: dict[str, Any] = panel_facts(panel, middle, shapes, checks, any(stuff.apex), failed)
+    if not blank.isometric:
+        facts["area"] = sheet_area(middle, cuts)  # bent to the end, whatever ``bend`` is
+    figures = {**spec.figures, **strain(checks), **neutral_figures(blank)}
+    facts |= {"figures": figures, "notes": list(spec.notes)}
+    if spec.rail_fit is not None:
+        facts |= rail_facts(spec.rail_fit, spec.mm_per_unit)
+    return replace(panel, facts=facts), blank, checks
+
+
+def _stuff(spec: PanelSpec, how: Making) -> _Stuff:
+    """The middle surface of a panel in space, proven and with its gap."""
+    thickness, layers = how.thickness, how.layers
+    described, drawings, features = _described(spec, how.tolerance)
     checks = prove_surface(spec.name, described, (0.0,), reaches_apex=False, fit=spec.rail_fit)
-    require(checks, allow)
-    middle = _middle(described, thickness, reference)
+    require(checks, how.allow)
+    middle = _middle(described, thickness, how.reference)
     if spec.gap:
         middle = with_gap(middle, spec.gap)
     elif thickness and middle.closes is False and (middle.closing_angle or 0.0) <= SMOOTH:
@@ -148,37 +226,28 @@ def _panel(
         _refuse_thick_apex(shapes, apex)
         _refuse_layers_apart(middle, layers)
         checks = prove_surface(spec.name, middle, layers, reaches_apex=any(apex), fit=spec.rail_fit)
-        require(checks, allow)
-    developments = develop_chain(middle)
-    chain = middle if bend == 1.0 else bent(middle, developments, bend)
-    mesh, rulings = _meshed(chain, layers, developments, tolerance)
-    pattern = lay_out(middle, developments, rulings, drawings)
-    shapes3d = shapes if bend == 1.0 else tuple(classify(patch) for patch in chain.patches)
-    panel = Panel(spec.name, spec.kind, chain, shapes3d, thickness, rulings, mesh, pattern)
-    panel = replace(panel, spacetime=_spacetime(spec, middle))
-    checks += prove_pattern(
-        panel, middle, developments, tolerance=tolerance, smallest_bend=smallest_bend
-    )
-    require(checks, allow)
-    failed = sorted({check.name for check in checks if not check.passed})
-    facts: dict[str, Any] = panel_facts(panel, middle, shapes, checks, any(apex), failed)
-    facts |= {"figures": {**spec.figures, **strain(checks)}, "notes": list(spec.notes)}
-    if spec.rail_fit is not None:
-        facts |= rail_facts(spec.rail_fit, spec.mm_per_unit)
-    return replace(panel, facts=facts), checks
+        require(checks, how.allow)
+    return _Stuff(middle, shapes, apex, drawings, features, checks)
 
 
-def _described(spec: PanelSpec, tolerance: float) -> tuple[Chain, tuple[Drawing, ...]]:
-    """The surface that the job describes, in mm, in its place, opened at its cut; and what is
-    drawn on it."""
+def _described(spec: PanelSpec, tolerance: float) -> tuple[Chain, tuple[Drawing, ...], Features]:
+    """The surface that the job describes, in mm, in its place, trimmed and opened at its cut;
+    what is drawn on it; and the features, in its place too."""
     matrix = np.eye(4) if spec.place is None else spec.place
     patches = tuple(patch.transformed(matrix, spec.mm_per_unit) for patch in spec.patches)
-    chain = link(patches, base_closed=spec.base_closed, tolerance=tolerance)
     drawings = tuple(drawing.scaled(spec.mm_per_unit) for drawing in spec.drawings)
+    features, base_closed = spec.features.moved(matrix), spec.base_closed
+    for trim in features.trims:
+        try:
+            left = trimmed(patches, trim.point, trim.normal, base_closed=base_closed)
+        except GeometryError as error:
+            raise error.at(place=trim.place) from None
+        patches, base_closed, drawings = left.patches, left.base_closed, left.carried(drawings)
+    chain = link(patches, base_closed=base_closed, tolerance=tolerance)
     if spec.cut is None:
-        return chain, drawings
+        return chain, drawings, features
     opened = cut_at(chain, spec.cut)
-    return opened, carried(drawings, chain, opened, spec.cut)
+    return opened, carried(drawings, chain, opened, spec.cut), features
 
 
 def _spacetime(spec: PanelSpec, middle: Chain) -> Spacetime | None:
@@ -196,26 +265,27 @@ def _middle(chain: Chain, thickness: float, reference: str) -> Chain:
 
 
 def _meshed(
-    chain: Chain, layers: tuple[float, ...], developments: tuple[Development, ...], tolerance: float
+    chain: Chain, how: Making, places: Flat, cuts: tuple[Cut, ...]
 ) -> tuple[Mesh, tuple[Array, ...]]:
     """The mesh within the tolerance, what float32 will round off taken away, and its rulings.
 
     A very thick sheet's volume needs more rulings than the distance does: then as many as keep
-    it within area x tolerance.
+    it within area x tolerance. So do triangles between the edges of holes, now and then.
     """
-
-    def places(number: int, t: Array, v: Array) -> Array:
-        return developments[number].points(t, v)
-
+    layers, tolerance = how.layers, how.tolerance
     reach = max(float(np.abs(patch_box(patch)).max()) for patch in chain.patches)
     rounding = FLOAT32 * (reach + abs(layers[0]))
-    aim = max(tolerance - rounding, 0.5 * tolerance)
+    limit = aim = max(tolerance - rounding, 0.5 * tolerance)
+    area = sheet_area(chain, cuts)
+    if area <= NOTHING * sheet_area(chain, ()):
+        raise GeometryError("the cutouts leave nothing of the panel", remedy="make them smaller")
     for _ in range(ATTEMPTS):
         placements = [place(patch, layers, aim) for patch in chain.patches]
         rulings = tuple(placement.t for placement in placements)
         deviation = max(placement.deviation for placement in placements)
-        mesh = build_mesh(chain, rulings, layers, places, deviation)
-        excess = volume_error(mesh, chain, layers[-1] - layers[0]) / tolerance
+        mesh = build_mesh(chain, rulings, layers, places, deviation, cuts, aim)
+        excess = volume_error(mesh, chain, area, how.thickness) / tolerance
+        excess = max(excess, mesh.deviation / limit)
         if excess <= 1.0:
             break
         aim *= 0.95 / excess

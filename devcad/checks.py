@@ -78,7 +78,7 @@ def at_most(
     )
 
 
-FOLLOWS = {"twist": ("isometry", "fold-back", "step-twist", "volume")}
+FOLLOWS = {"twist": ("isometry", "fold-back", "step-twist", "volume", "area")}
 """A surface that twists is not isometric to any pattern: who allows that allows what follows."""
 
 NAMES = (
@@ -89,16 +89,30 @@ NAMES = (
     "mesh-deviation",
     "fold-back",
     "overlap",
+    "seam",
     "bend-radius",
+    "outer-strain",
+    "springback",
+    "flange",
+    "hole-near-bend",
+    "hole-size",
     "step-deviation",
     "step-twist",
     "step-valid",
+    "step-seam",
     "dxf-deviation",
     "dxf-readback",
+    "dxf-profile",
+    "nest-gap",
     "svg-deviation",
     "svg-readback",
+    "pdf-deviation",
+    "pdf-readback",
+    "csv-readback",
     "stl-readback",
     "glb-readback",
+    "3mf-readback",
     "volume",
+    "area",
 )
 """Every check there is: what --allow accepts."""

@@ -10,16 +10,17 @@ import json
 import warnings
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NoReturn
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from devcad import __version__, console
+from devcad import __version__, console, words
 from devcad.errors import DevcadError, JobError
 from devcad.interrupts import Interrupts
-from devcad.outcomes import work_through
+from devcad.outcomes import work_through, work_together
 
 if TYPE_CHECKING:
+    from devcad.batch.nest import Lot
     from devcad.geometry.analysis.analysis import Analysis
     from devcad.job.load import Job
     from devcad.pipeline import Progress
@@ -90,8 +91,8 @@ def export(
     as_json: AsJson = False,
 ) -> int:
     """Write OUT/<job>/ with the files of the recipe and report.json."""
-    formats, allowed = _formats(to), _checks(allow)
-    _recipe(pipeline)
+    formats, allowed = words.formats(to), words.checks(allow)
+    words.recipe(pipeline)
 
     def work(job: Job, progress: Progress) -> dict[str, Any]:
         from devcad import pipeline as spine
@@ -129,8 +130,8 @@ def check(
     as_json: AsJson = False,
 ) -> int:
     """Build and check the geometry; write nothing."""
-    allowed = _checks(allow)
-    _recipe(pipeline)
+    allowed = words.checks(allow)
+    words.recipe(pipeline)
 
     def work(job: Job, progress: Progress) -> dict[str, Any]:
         from devcad.pipeline import build
@@ -145,6 +146,51 @@ def check(
         return check_lines(report)
 
     return work_through(jobs, work, as_json, lines, context.obj)
+
+
+@app.command(
+    epilog="""\b
+Examples:
+  devcad nest samples/lampshade.toml -o nested
+  devcad nest *.toml --sheet 2000x1000 --gap 5 -o nested"""
+)
+def nest(
+    context: typer.Context,
+    jobs: Jobs,
+    pipeline: Pipeline = None,
+    sheet: Annotated[
+        str | None, typer.Option(metavar="WxH", help="The sheets' size in mm, such as 1000x500.")
+    ] = None,
+    gap: Annotated[
+        float | None, typer.Option(metavar="MM", help="Between panels and to the sheet's edge.")
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, max=2**31, help="Of the search.")] = 0,
+    time: Annotated[int, typer.Option(min=1, metavar="S", help="For each look.")] = 60,
+    out: Out = "out",
+    allow: Allow = None,
+    as_json: AsJson = False,
+) -> int:
+    """Put all panels on sheets: OUT/sheet-<material>-<thickness>-<n>.dxf and OUT/nest.json."""
+    allowed = words.checks(allow)
+    words.recipe(pipeline)
+    size = words.sheet(sheet, gap)
+
+    def work(job: Job, progress: Progress) -> Lot:
+        from devcad.batch.nest import lot
+
+        return lot(job, pipeline=pipeline, allow=allowed, sheet=size, progress=progress)
+
+    def finish(lots: list[Lot], progress: Progress) -> dict[str, Any]:
+        from devcad.batch.nest import nest_lots
+
+        return nest_lots(lots, Path(out), seed=seed, seconds=time, progress=progress)
+
+    def lines(told: dict[str, Any]) -> Iterable[str]:
+        from devcad.report.text import nest_lines
+
+        return nest_lines(told, out)
+
+    return work_together(jobs, work, finish, as_json, lines, context.obj)
 
 
 @app.command(
@@ -222,7 +268,7 @@ def list_(
 ) -> int:
     """Name the kinds, formats, recipes and materials there are."""
     if what not in LISTED:
-        _usage(f'there is no list "{what}"', what, LISTED)
+        words.usage(f'there is no list "{what}"', what, LISTED)
     from devcad.report.lists import LISTS
 
     rows = LISTS[what]()
@@ -258,7 +304,7 @@ def new(
 
     kinds = template_kinds()
     if kind not in kinds:
-        _usage(f'there is no surface kind "{kind}"', kind, kinds)
+        words.usage(f'there is no surface kind "{kind}"', kind, kinds)
     console.say(template(kind).rstrip("\n"))
     return 0
 
@@ -328,48 +374,3 @@ def _one_sentence(message: str) -> str:
     """A usage message as what our error lines begin with."""
     message = message.strip().removesuffix(".")
     return f"usage: {message[:1].lower()}{message[1:]}"
-
-
-# --- usage ---------------------------------------------------------------------------------
-
-
-def _formats(text: str | None) -> list[str]:
-    """The formats of --to, none where it is not given."""
-    from devcad.export import FORMATS
-
-    names = [] if text is None else [name.strip() for name in text.split(",")]
-    for name in names:
-        if name not in FORMATS:
-            _usage(f'this version knows no format "{name}"', name, FORMATS, "--to")
-    return names
-
-
-def _checks(allow: Sequence[str] | None) -> list[str]:
-    """The checks of --allow, given one by one or with commas."""
-    from devcad.checks import NAMES
-
-    names = [name.strip() for text in allow or () for name in text.split(",")]
-    for name in names:
-        if name not in NAMES:
-            _usage(f'this version knows no check "{name}"', name, NAMES, "--allow")
-    return names
-
-
-def _recipe(name: str | None) -> None:
-    """Refuse a --pipeline that there is not, before any job is read."""
-    if name is None:
-        return
-    from devcad.job.recipe import recipe_names
-
-    known = recipe_names()
-    if name not in known:
-        _usage(f'there is no pipeline "{name}"', name, known, "--pipeline")
-
-
-def _usage(what: str, word: str, known: Iterable[str], option: str = "") -> NoReturn:
-    """The error of a word on the command line that is not among the known ones."""
-    from devcad.job.invalid import did_you_mean
-
-    names = list(known)
-    limit, remedy = ", ".join(names), did_you_mean(word, names)
-    raise JobError(what, place=option, value=word, limit=limit, remedy=remedy)

@@ -7,8 +7,10 @@ from typing import Any
 import numpy as np
 
 from devcad.checks import Check
+from devcad.flatten.blank import Blank
+from devcad.flatten.green import enclosed_area, perimeter
 from devcad.flatten.lorentz import lorentz_area
-from devcad.flatten.outline import enclosed_area, perimeter
+from devcad.flatten.neutral import least_k, left_over
 from devcad.geometry.chain import Chain
 from devcad.geometry.classify import EXACT, Shape, sample_parameters
 from devcad.geometry.rail_fit import RailFit
@@ -26,8 +28,10 @@ def panel_facts(
 ) -> dict[str, Any]:
     """The panel's entry in report.json, in its order; what does not exist is None."""
     by_name = {check.name: check for check in checks}
+    fibre = panel.blank.fibre if panel.blank else None
     radius = min(smallest_radius(patch).value for patch in middle.patches)
     angle = middle.closing_angle
+    contours = (panel.pattern.outline, *panel.pattern.holes)
     return {
         "name": panel.name,
         "kind": panel.kind,
@@ -39,15 +43,15 @@ def panel_facts(
         "orientable": middle.orientable,
         "watertight": panel.mesh.watertight,
         "apex": apex,
-        "area": panel.pattern.area,
-        "flat_area": enclosed_area(panel.pattern.outline),
+        "area": panel.area,
+        "flat_area": sum(enclosed_area(contour) for contour in contours),
         "flat_bbox": list(panel.pattern.bbox),
         "min_radius": _finite(radius),
         "max_twist_deg": _finite(by_name["twist"].value),
         "max_crease_deg": None,
         "relaxed_mm": None,
-        "k_neutral": None,
-        "k_source": None,
+        "k_neutral": None if fibre is None else least_k(fibre, middle.patches),
+        "k_source": None if fibre is None else fibre.words,
         "clearance": _finite(by_name["regular"].value),
         "singularities": [
             {"t": s.t, "point": s.point.tolist(), "type": s.type}
@@ -56,12 +60,21 @@ def panel_facts(
         ],
         "regression": _regression(middle, shapes),
         "ruling_count": sum(len(t) - 1 for t in panel.rulings) + 1,
-        "cut_length": perimeter(panel.pattern.outline),
+        "cut_length": sum(perimeter(contour) for contour in contours),
         "pierces": 1 + len(panel.pattern.holes),
         "mass_g": None,
         "lorentz_area": None if panel.spacetime is None else lorentz_area(panel.spacetime),
         "allowed": allowed,
     }
+
+
+def neutral_figures(blank: Blank) -> dict[str, float]:
+    """What is left where K depends on the radius: ``neutral_rest``, by how much mm at most the
+    sheet is longer or shorter than its pattern because K is one number along each ruling."""
+    if blank.fibre is None or not blank.fibre.law.kinks:
+        return {}
+    fibre = blank.fibre
+    return {"neutral_rest": sum(left_over(fibre, patch) for patch in blank.middle.patches)}
 
 
 def rail_facts(fit: RailFit, mm_per_unit: float) -> dict[str, Any]:

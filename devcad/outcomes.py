@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from devcad import console
 from devcad.errors import DevcadError, FileError, JobError
@@ -14,6 +14,11 @@ from devcad.interrupts import Interrupts
 if TYPE_CHECKING:
     from devcad.job.load import Job
     from devcad.pipeline import Progress
+
+
+T = TypeVar("T")
+Lot = TypeVar("Lot")
+"""What working on one job gives."""
 
 
 @dataclass
@@ -34,7 +39,7 @@ class Outcome:
         """The report, or what went wrong first."""
         if self.report is not None:
             return self.report
-        return console.entry(self.errors[0], self.path)
+        return console.entry(self.errors[0], self.path or None)
 
 
 def work_through(
@@ -71,6 +76,66 @@ def work_through(
     if unsaid:
         raise unsaid[0]
     return max(outcome.code for outcome in outcomes)
+
+
+def work_together(
+    paths: Sequence[str],
+    work: Callable[[Job, Progress], Lot],
+    finish: Callable[[list[Lot], Progress], dict[str, Any]],
+    as_json: bool,
+    lines: Callable[[dict[str, Any]], Iterable[str]],
+    interrupts: Interrupts,
+) -> int:
+    """Load every job, work on each, then finish with all of them at once, or with none where one
+    failed; the exit code is the largest.
+
+    Raises:
+        FileError: stdout cannot be written.
+    """
+    outcomes = [_loaded(path) for path in paths]
+    interrupts.check()
+    lots: list[Lot] = []
+    told: dict[str, Any] = {}
+    if not _refuse_twins(outcomes):
+        for outcome in outcomes:
+            if outcome.job is not None:
+                _work_on(outcome, outcome.job, lambda job, show: lots.append(work(job, show)))
+            interrupts.check()
+        if not any(outcome.errors for outcome in outcomes):
+            last = _finished(lots, finish, paths)
+            interrupts.check()
+            told = last.report or {}
+            outcomes += [last] if last.errors else []
+    failed = [outcome for outcome in outcomes if outcome.errors]
+    for outcome in failed:
+        for error in outcome.errors:
+            console.tell(error)
+    if as_json:
+        console.say_json([outcome.entry() for outcome in failed] or [told])
+    elif not failed:
+        for line in lines(told):
+            console.say(line)
+    return max((outcome.code for outcome in failed), default=0)
+
+
+def _finished(
+    lots: list[Lot],
+    finish: Callable[[list[Lot], Progress], dict[str, Any]],
+    paths: Sequence[str],
+) -> Outcome:
+    """What became of all jobs together; an error belongs to the job that its place names."""
+    from devcad.report.progress import ProgressLine
+
+    outcome = Outcome("")
+    with ProgressLine() as progress:
+        try:
+            outcome.report = finish(lots, progress.show)
+        except Exception as error:
+            first = console.failure(error)
+            named = (path for path in paths if f"{first.place} > ".startswith(f"{path} > "))
+            outcome.path = next(named, "")
+            outcome.errors = console.failures(first, outcome.path) if outcome.path else [first]
+    return outcome
 
 
 def _loaded(path: str) -> Outcome:
@@ -117,7 +182,9 @@ def _refuse_twins(outcomes: Sequence[Outcome]) -> bool:
     return any(outcome.job and outcome.errors for outcome in outcomes)
 
 
-def _work_on(outcome: Outcome, job: Job, work: Callable[[Job, Progress], dict[str, Any]]) -> None:
+def _work_on(
+    outcome: Outcome, job: T, work: Callable[[T, Progress], dict[str, Any] | None]
+) -> None:
     from devcad.report.progress import ProgressLine
 
     with ProgressLine() as progress:

@@ -6,10 +6,13 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from devcad.checks import Check
+from devcad.flatten.blank import Blank
 from devcad.flatten.lorentz import Spacetime
 from devcad.flatten.pattern import Pattern
 from devcad.geometry.chain import Chain
 from devcad.geometry.classify import Shape
+from devcad.geometry.cuts import Cut
+from devcad.geometry.seams import Meeting
 from devcad.geometry.taylor import Array
 from devcad.mesh.mesh import Mesh
 
@@ -22,7 +25,9 @@ class Panel:
     ``shapes[k]`` says what its patch k is: an analytic surface with its numbers, or none.
     ``thickness`` is 0 for a surface. ``rulings[k]`` are the certified parameters of patch k.
     ``facts`` are the panel's entries for the report. ``spacetime`` is the middle surface, not
-    bent, in Minkowski space, where it was constructed there.
+    bent, in Minkowski space, where it was constructed there. ``blank`` is what the pattern was
+    laid out from, with the middle surface bent to the end; ``surface_area`` the area in mm2 of
+    ``chain`` without what is cut out, None where the pattern has the same.
     """
 
     name: str
@@ -35,11 +40,23 @@ class Panel:
     pattern: Pattern
     facts: dict[str, Any] = field(default_factory=dict)
     spacetime: Spacetime | None = None
+    cuts: tuple[Cut, ...] = ()
+    blank: Blank | None = None
+    surface_area: float | None = None
+
+    @property
+    def area(self) -> float:
+        """The area of the middle surface as it stands in space, without the cutouts, mm2."""
+        return self.pattern.area if self.surface_area is None else self.surface_area
 
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """One or more panels, with the tolerance they were built to and the checks they passed."""
+    """One or more panels, with the tolerance they were built to and the checks they passed.
+
+    ``material`` is the library's id of it, "" where the job names none. ``grain`` is in radians
+    from +x in the pattern. ``quantity`` is how many of each panel the job asks for.
+    """
 
     name: str
     panels: tuple[Panel, ...]
@@ -50,3 +67,9 @@ class Part:
     part_number: str = ""
     description: str = ""
     colour: tuple[float, float, float] = (0.62, 0.66, 0.70)
+    seams: tuple[Meeting, ...] = ()
+    material: str = ""
+    revision: str = ""
+    quantity: int = 1
+    grain: float | None = None
+    finish: str | None = None

@@ -11,20 +11,25 @@ from typing import Any
 from devcad.assemble import PanelSpec, assemble
 from devcad.checks import FOLLOWS, Check, at_most, require
 from devcad.errors import DevcadError, FileError
-from devcad.export import DEFAULT_FORMATS, Options, Written, writer
+from devcad.export import DEFAULT_FORMATS, LAST, Options, Written, writer
 from devcad.export.folder import REPORT, published, unwritable
 from devcad.job.load import Job, JobPanel, load
 from devcad.job.recipe import Recipe, known_checks, known_formats, resolve
 from devcad.part import Panel, Part
 from devcad.proofs import mesh_volume
 from devcad.report import SvgOrigin, make_report, to_bytes
+from devcad.shop.fibre import fibre
+from devcad.shop.kerf import kerfed
+from devcad.shop.limits import bounds
 from devcad.shop.materials import Material, material
 
 Progress = Callable[[str], None]
 """Told what begins now."""
 
-MESHES = {"stl", "glb"}
+MESHES = {"stl", "glb", "3mf"}
 """The formats that carry a panel's triangles."""
+CUT_FILES = {"dxf", "svg", "pdf"}
+"""The formats that a tool with a kerf follows."""
 CUTTING = ("gap", "cut")
 """The keys of a surface that only the assembly can judge; its errors begin with their names."""
 
@@ -80,7 +85,9 @@ def build(
             reference=job.reference,
             tolerance=job.tolerance,
             bend=job.bend,
-            smallest_bend=sheet.smallest_bend(job.thickness) if sheet else None,
+            fibre=fibre(recipe.shop.neutral, sheet, job.thickness),
+            limits=bounds(recipe.shop.limits, recipe.shop.bends, sheet, job.thickness),
+            seams=job.seams,
             allow=recipe.allow,
         )
     except DevcadError as error:
@@ -91,6 +98,12 @@ def build(
         job_sha256=job.sha256,
         part_number=job.meta.part_number,
         description=job.meta.description,
+        colour=sheet.colour if sheet else part.colour,
+        material=job.material or "",
+        revision=job.meta.revision,
+        quantity=job.meta.quantity,
+        grain=job.meta.grain,
+        finish=job.meta.finish,
     )
 
 
@@ -118,13 +131,18 @@ def export(
         was_allowed.update(FOLLOWS["twist"])
     allowed = frozenset(was_allowed.union(known_checks(list(allow))))
     target = Path(out, part.name)
+    how = options or Options()
+    cut = kerfed(part, how.kerf) if CUT_FILES.intersection(chosen) else part
     with published(Path(out), part.name) as folder:
         written: list[Written] = []
-        for name in chosen:
+        for name in sorted(chosen, key=LAST.__contains__):
             progress(f"{part.name}: {name}")
             write = writer(name)
             with _naming(target, f"{part.name}.{name}"):
-                written += write(part, folder, options or Options())
+                if name in CUT_FILES:
+                    written += kerf_noted(write(cut, folder, how), how.kerf)
+                else:
+                    written += write(part, folder, how)
         checks = [*part.checks, *(check for file in written for check in file.checks)]
         if MESHES.intersection(chosen):
             solids = (panel for panel in part.panels if panel.mesh.watertight)
@@ -132,11 +150,21 @@ def export(
         meshes = (_near_enough(file, part) for file in written if file.format in MESHES)
         checks += [check for check in meshes if not check.passed]  # else the surface's own says it
         require(checks, allowed)
-        origin = _svg_origin(part) if "svg" in chosen else None
+        origin = _svg_origin(cut) if "svg" in chosen else None
         report = make_report(part, checks=checks, files=written, svg_origin=origin)
         with _naming(target, REPORT):
             (folder / REPORT).write_bytes(to_bytes(report))
     return report
+
+
+def kerf_noted(files: list[Written], kerf: float) -> list[Written]:
+    """The files of a cut pattern, each with a word on its kerf where there is one."""
+    if kerf == 0.0:
+        return files
+    words = f"contours moved for a kerf of {kerf:.6g} mm"
+    return [
+        replace(file, note="; ".join(part for part in (file.note, words) if part)) for file in files
+    ]
 
 
 def _near_enough(file: Written, part: Part) -> Check:
@@ -167,7 +195,12 @@ def _naming(target: Path, file: str) -> Iterator[None]:
 
 
 def _placed(error: DevcadError, job: Job) -> DevcadError:
-    """The error of an assembly, at the key of the surface that it speaks of, else at the job."""
+    """The error of an assembly, at the key of the surface that it speaks of, else at the job,
+    whose path and panel stand once."""
+    for known in (f"{job.path} > ", f"panel {error.panel} > "):
+        error.what = error.what.replace(known, "")
+    if f" > panel {error.panel}" in error.place:
+        error.panel = ""
     key, colon, rest = error.what.partition(": ")
     if error.place or not colon or key not in CUTTING:
         return error.at(place=job.path)
@@ -205,6 +238,7 @@ def _specs(panel: JobPanel, job: Job) -> list[PanelSpec]:
             cut=getattr(panel.surface, "cut", None),
             gap=getattr(panel.surface, "gap", 0.0) * job.mm_per_unit,
             place=panel.place,
+            features=panel.features,
         )
         for k, made in enumerate(built.panels, start=1)
     ]
@@ -214,7 +248,7 @@ def _weighed(panel: Panel, sheet: Material | None) -> Panel:
     """The panel with its mass among its facts, where the material is known."""
     if sheet is None or not panel.thickness:
         return panel
-    mass = sheet.mass(panel.pattern.area, panel.thickness)
+    mass = sheet.mass(panel.facts["area"], panel.thickness)
     return replace(panel, facts={**panel.facts, "mass_g": mass})
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from devcad.checks import Check, Where, at_most
-from devcad.flatten.development import Development
-from devcad.flatten.outline import integral, surface_area
+from devcad.flatten.blank import Blank
+from devcad.flatten.outline import integral
 from devcad.flatten.verify import fold_back, isometry, overlap_area
 from devcad.geometry.chain import Chain
 from devcad.geometry.classify import EXACT
@@ -18,7 +18,6 @@ from devcad.geometry.regularity import (
     Clearance,
     Extreme,
     clearance,
-    smallest_radius,
     twist,
 )
 from devcad.geometry.taylor import Array
@@ -51,18 +50,11 @@ def prove_surface(
     ]
 
 
-def prove_pattern(
-    panel: Panel,
-    middle: Chain,
-    developments: tuple[Development, ...],
-    *,
-    tolerance: float,
-    smallest_bend: float | None,
-) -> list[Check]:
-    """The checks isometry, mesh-deviation, fold-back, overlap, and bend-radius where known."""
-    pairs = list(zip(middle.patches, developments, strict=True))
-    patch, worst = _worst((p, isometry(p, d)) for p, d in pairs)
-    checks = [
+def prove_pattern(panel: Panel, blank: Blank, *, tolerance: float) -> list[Check]:
+    """The checks isometry, mesh-deviation, fold-back and overlap."""
+    every = zip(blank.middle.patches, blank.developments, blank.fibres, strict=True)
+    patch, worst = _worst((p, isometry(p, d, f)) for p, d, f in every)
+    return [
         at_most(
             "isometry",
             panel.name,
@@ -74,12 +66,9 @@ def prove_pattern(
             remedy="the curve may be rougher than its pieces say; give it as points or a chain",
         ),
         _mesh_deviation(panel, tolerance),
-        _fold_back(panel.name, middle, developments),
+        _fold_back(panel, blank),
         _overlap(panel),
     ]
-    if smallest_bend is not None and panel.thickness:
-        checks.append(_bend_radius(panel.name, middle, panel.thickness, smallest_bend))
-    return checks
 
 
 def _crease(name: str, fit: RailFit) -> Check:
@@ -181,11 +170,11 @@ def _mesh_deviation(panel: Panel, tolerance: float) -> Check:
     )
 
 
-def _fold_back(name: str, middle: Chain, developments: tuple[Development, ...]) -> Check:
-    worst, size = fold_back(middle, developments)
+def _fold_back(panel: Panel, blank: Blank) -> Check:
+    worst, size = fold_back(blank.middle, blank.developments, panel.pattern, blank.fibres)
     return at_most(
         "fold-back",
-        name,
+        panel.name,
         worst.value,
         FOLD_BACK_LIMIT * size,
         "mm",
@@ -210,34 +199,16 @@ def _overlap(panel: Panel) -> Check:
     )
 
 
-def _bend_radius(name: str, middle: Chain, thickness: float, limit: float) -> Check:
-    patch, tightest = min(
-        ((p, smallest_radius(p)) for p in middle.patches), key=lambda pair: pair[1].value
-    )
-    inside = tightest.value - 0.5 * thickness
-    return Check(
-        "bend-radius",
-        name,
-        inside,
-        limit,
-        "mm",
-        inside >= limit,
-        _where(patch, tightest),
-        f"the inside radius is {inside:.4g} mm at t = {tightest.t:.6g}",
-        "use a thinner or softer sheet, or a larger radius",
-    )
-
-
 def sheet_volume(panel: Panel) -> float:
-    """The exact volume of a panel in mm3: area x thickness and what an apex adds."""
-    return panel.pattern.area * panel.thickness + _tips(panel.chain, panel.thickness)
+    """The exact volume of a panel in mm3: net area x thickness and what an apex adds."""
+    return panel.area * panel.thickness + _tips(panel.chain, panel.thickness)
 
 
-def volume_error(mesh: Mesh, chain: Chain, thickness: float) -> float:
-    """How far a solid's mesh is from the sheet's volume, per unit of its area, mm; 0 of a sheet."""
+def volume_error(mesh: Mesh, chain: Chain, area: float, thickness: float) -> float:
+    """How far a solid's mesh is from the volume of a sheet of this area, per unit of the area, mm;
+    0 of a sheet without thickness."""
     if not mesh.watertight:
         return 0.0
-    area = sum(surface_area(patch) for patch in chain.patches)
     return abs(volume(mesh) - area * thickness - _tips(chain, thickness)) / area
 
 
@@ -258,8 +229,8 @@ def _tip_density(frame: Frame) -> Array:
 
 def mesh_volume(panel: Panel, tolerance: float) -> Check:
     """The check ``volume`` of a solid's mesh: the exact volume, within area x tolerance."""
-    area = panel.pattern.area
-    value = area * volume_error(panel.mesh, panel.chain, panel.thickness)
+    area = panel.area
+    value = area * volume_error(panel.mesh, panel.chain, area, panel.thickness)
     return at_most(
         "volume",
         panel.name,

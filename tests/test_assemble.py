@@ -7,7 +7,7 @@ from patches import frustum
 import devcad
 from devcad.assemble import PanelSpec, assemble
 from devcad.errors import GeometryError, LimitError
-from devcad.flatten.outline import perimeter
+from devcad.flatten.green import perimeter
 from devcad.geometry import taylor
 from devcad.geometry.drawing import Drawing
 from devcad.geometry.patch import Patch, RulingJet

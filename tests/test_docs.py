@@ -57,8 +57,17 @@ def test_the_readme_lists_every_format() -> None:
     from devcad.export import FORMATS
 
     files = table_words(README, "## What comes out")
-    figure = {"lorentz-svg": "spacelike-cone-lorentz-not-for-cutting.svg"}
-    assert files == {figure.get(name, f"lampshade.{name}") for name in FORMATS} | {"report.json"}
+    other = {
+        "lorentz-svg": "spacelike-cone-lorentz-not-for-cutting.svg",
+        "step-flat": "lampshade-flat.step",
+        "step-sheet": "lampshade-sheet.step",
+        "traveller": "lampshade-traveller.pdf",
+        "cutlist": "lampshade-cutlist.csv",
+        "rolling": "lampshade-rolling.csv",
+    }
+    formats = {name for name in FORMATS if name not in other}
+    named = {f"lampshade.{name}" for name in formats} | set(other.values())
+    assert files == named | {"report.json"}
 
 
 def test_the_readme_lists_every_check() -> None:

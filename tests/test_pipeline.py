@@ -90,7 +90,7 @@ def test_the_report_describes_the_files_beside_it(lamp: Part, tmp_path: Path) ->
 
 def test_the_report_has_the_keys_of_the_contract_in_order(lamp: Part, tmp_path: Path) -> None:
     report = devcad.export(lamp, tmp_path / "out", formats=LIGHT)
-    top = "devcad job job_sha256 units panels checks files svg_origin"
+    top = "devcad job job_sha256 units panels seams checks files svg_origin"
     panel = (
         "name kind type causal closed closes closing_angle_deg orientable watertight apex area "
         "flat_area flat_bbox min_radius max_twist_deg max_crease_deg relaxed_mm k_neutral "
@@ -501,7 +501,7 @@ def test_a_recipe_may_ask_for_the_oldest_dxf(tmp_path: Path) -> None:
     assert "AC1009" in (tmp_path / "lamp" / "lamp-mm.dxf").read_text()  # the version's own name
 
 
-@pytest.mark.parametrize("name", ["cad", "sheet-metal", "paper"])
+@pytest.mark.parametrize("name", ["cad", "sheet-metal", "leather", "paper"])
 def test_a_recipe_says_what_it_is_for(name: str) -> None:
     assert len(recipe_names()[name]) > 10
 
@@ -529,7 +529,7 @@ def test_the_public_names_are_all_there() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("recipe", ["cad", "sheet-metal", "paper"])
+@pytest.mark.parametrize("recipe", ["cad", "sheet-metal", "leather", "paper"])
 @pytest.mark.parametrize(
     "sample", sorted((REPOSITORY / "samples").glob("*.toml")), ids=lambda p: p.stem
 )

@@ -138,8 +138,8 @@ class Use:
 
 @dataclass(frozen=True, slots=True)
 class Face:
-    """``loop`` runs counterclockwise seen from outside; ``flipped`` says that the surface's own
-    normal points inward.
+    """``loop`` runs counterclockwise seen from outside, ``holes`` clockwise; ``flipped`` says that
+    the surface's own normal points inward.
 
     ``probes``: places (k, 2) and the true points (k, 3) there; for planes, cylinders and cones
     only the points, ``skin`` whether twist counts here (a front or back, not a wall).
@@ -151,12 +151,13 @@ class Face:
     skin: bool = False
     places: Array | None = None
     points: Array | None = None
+    holes: tuple[tuple[Use, ...], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
 class Body:
     """One panel: a solid, or a shell whose front is outside. ``volume`` is the exact volume that
-    the solid must have, mm3."""
+    the solid must have, mm3; ``moved`` how far an exact edge was moved on purpose, mm."""
 
     name: str
     vertices: Array
@@ -164,3 +165,4 @@ class Body:
     faces: tuple[Face, ...]
     solid: bool
     volume: float
+    moved: float = 0.0

@@ -10,9 +10,11 @@ import unicodedata
 from collections.abc import Iterator
 from contextlib import contextmanager
 from datetime import UTC, datetime
+from functools import cache
 from pathlib import Path
 
 from OCP.APIHeaderSection import APIHeaderSection_MakeHeader
+from OCP.collections import DataMap_TCollection_AsciiString_TCollection_AsciiString as Settings
 from OCP.IFSelect import IFSelect_RetDone
 from OCP.Interface import Interface_Static
 from OCP.Message import Message, Message_Messenger
@@ -20,7 +22,11 @@ from OCP.Quantity import Quantity_Color, Quantity_TOC_sRGB
 from OCP.STEPCAFControl import STEPCAFControl_Writer
 from OCP.STEPControl import STEPControl_AsIs, STEPControl_Reader
 from OCP.StepData import StepData_Protocol, StepData_StepWriter
-from OCP.TCollection import TCollection_ExtendedString, TCollection_HAsciiString
+from OCP.TCollection import (
+    TCollection_AsciiString,
+    TCollection_ExtendedString,
+    TCollection_HAsciiString,
+)
 from OCP.TDataStd import TDataStd_Name
 from OCP.TDF import TDF_Label
 from OCP.TDocStd import TDocStd_Document
@@ -30,13 +36,14 @@ from OCP.XCAFDoc import XCAFDoc_ColorSurf, XCAFDoc_DocumentTool
 
 from devcad import __version__
 from devcad.errors import CheckFailed, FileError, JobError
+from devcad.export._step_lean import lean
 
 SCHEMAS = {"AP214": "AP214IS", "AP242": "AP242DIS"}
 _LONG_REAL = re.compile(rb"-?\d\.\d{16}E[+-]\d+")
-_LINK = re.compile(rb"NEXT_ASSEMBLY_USAGE_OCCURRENCE\('\d+'")
-_PAINT = re.compile(
-    rb"MECHANICAL_DESIGN_GEOMETRIC_PRESENTATION_REPRESENTATION\(\s*'',\s*\(\s*#(\d+)\s*\),\s*#(\d+)"
-    rb"\s*\);\s*#\d+ = STYLED_ITEM\(\s*'color',\s*\(\s*#(\d+)\s*\),\s*#(\d+)\s*\);"
+_LINK = re.compile(rb"NEXT_ASSEMBLY_USAGE_OCCURRENCE\(\s*'\d+'")
+_PAINT = re.compile(  # the kernel breaks its lines between any two words
+    rb"MECHANICAL_DESIGN_GEOMETRIC_PRESENTATION_REPRESENTATION \( '' , \( #(\d+) \) , #(\d+) \) ;"
+    rb" #\d+ = STYLED_ITEM \( 'color' , \( #(\d+) \) , #(\d+) \) ;".replace(b" ", rb"\s*")
 )
 EPOCH = "1970-01-01T00:00:00"
 _SETTINGS: dict[str, str | int] = {
@@ -45,6 +52,8 @@ _SETTINGS: dict[str, str | int] = {
     "write.precision.mode": 0,
 }
 
+_READING = {"FixShape.FixSelfIntersectionMode": "0"}
+
 
 def write_step(
     path: Path,
@@ -52,9 +61,12 @@ def write_step(
     bodies: list[tuple[str, TopoDS_Shape]],
     colour: tuple[float, float, float],
     schema: str,
+    *,
+    sparing: bool = False,
 ) -> None:
     """One STEP file in mm: one body is the product ``name``; several are the named products of
-    one assembly ``name``. ``colour`` is sRGB, 0 to 1. Equal input gives equal bytes.
+    one assembly ``name``. ``colour`` is sRGB, 0 to 1; ``sparing`` writes equal points once. Equal
+    input gives equal bytes.
 
     Raises:
         JobError: no such schema. FileError: the file could not be written.
@@ -71,8 +83,9 @@ def write_step(
         session = writer.ChangeWriter()
         _header(APIHeaderSection_MakeHeader(session.Model()), name)
         text = _printed(StepData_StepWriter(session.Model()), session.WS().Protocol())
+    text = _settled(text)
     try:
-        path.write_bytes(_settled(text))
+        path.write_bytes(lean(text) if sparing else text)
     except OSError as error:
         raise FileError(
             f"cannot write {path.name}: {error.strerror}",
@@ -83,11 +96,18 @@ def write_step(
 def read_step(path: Path) -> TopoDS_Shape:
     """The shape in a STEP file, read by a new reader after the model's own check.
 
+    Edges that cross are not mended: our files must not need it, and to look for them takes a time
+    that grows with the square of a face's holes.
+
     Raises:
         CheckFailed: the file does not read, or its model is inconsistent.
     """
     with _quiet():
         reader = STEPControl_Reader()
+        settings = Settings()
+        for name, value in _READING.items():
+            settings.Bind(TCollection_AsciiString(name), TCollection_AsciiString(value))
+        reader.SetShapeFixParameters(settings)
         read = reader.ReadFile(str(path)) == IFSelect_RetDone
         sound = read and reader.WS().ModelCheckList(True).IsEmpty(True)
         if not (sound and reader.TransferRoots() > 0):
@@ -157,12 +177,13 @@ def _printed(writer: StepData_StepWriter, protocol: StepData_Protocol) -> bytes:
     writer.SendModel(protocol)
     out = io.BytesIO()
     writer.Print(out)
-    return _LONG_REAL.sub(lambda m: _real(float(m[0])), out.getvalue())
+    real = cache(_real)  # most numbers stand in a file more than once
+    return _LONG_REAL.sub(lambda m: real(m[0]), out.getvalue())
 
 
-def _real(value: float) -> bytes:
+def _real(text: bytes) -> bytes:
     """A real in the exchange format: shortest digits, always a point, no negative zero."""
-    mantissa, _, exponent = repr(value + 0.0).partition("e")
+    mantissa, _, exponent = repr(float(text) + 0.0).partition("e")
     mantissa = mantissa.removesuffix("0") if mantissa.endswith(".0") else mantissa
     point = "" if "." in mantissa else "."
     return f"{mantissa}{point}{'E' if exponent else ''}{exponent}".encode()

@@ -12,9 +12,16 @@ from devcad.export._step_body import Body, Plane, Point, Ruled, Straight, Surfac
 from devcad.export._step_chart import chart
 from devcad.export._step_conics import arc_edge
 from devcad.export._step_draft import Draft, Skin
+from devcad.export._step_faces import Rims, add_skins
 from devcad.export._step_folds import folds, mirrored_knots, split
-from devcad.export._step_rails import EDGE_TOLERANCE, LongEdge, Piece, fitted_rails
+from devcad.export._step_places import Ground
+from devcad.export._step_rails import LongEdge, Piece, fitted_rails
+from devcad.export._step_regions import Region, regions
+from devcad.export._step_rims import edge_tolerance, rims
+from devcad.export._step_solid import add_end, add_walls
 from devcad.export._step_strips import Strip, panel_size, strips
+from devcad.export._step_touches import hair
+from devcad.geometry.cells import Run
 from devcad.geometry.fit import FLOOR, Spline
 from devcad.geometry.taylor import Array
 from devcad.part import Panel
@@ -40,11 +47,18 @@ def body(panel: Panel, tolerance: float, degree: int) -> Body:
     for k, strip in enumerate(parts):
         start = _start(strip, [skins[i] for (j, _), (i, _) in folded.items() if j == k])
         skins.append(_skin(strip, draft, lifts[k], tolerance, degree, start))
-    for skin in skins:
-        draft.add_strip(skin)
+    left = regions(panel, parts)
+    edges = [
+        _rims(panel, draft, skin, found, tolerance, degree)
+        for skin, found in zip(skins, left, strict=True)
+    ]
+    for skin, found, around in zip(skins, left, edges, strict=True):
+        add_skins(draft, skin, found, around)
+        if panel.thickness:
+            add_walls(draft, skin, found, around)
     if panel.thickness and count > len(parts):
-        draft.add_end(parts[0], skins[0], 0)
-        draft.add_end(parts[-1], skins[-1], 1)
+        add_end(draft, skins[0], 0, left[0])
+        add_end(draft, skins[-1], 1, left[-1])
     return Body(
         panel.name,
         np.array(draft.points),
@@ -52,7 +66,26 @@ def body(panel: Panel, tolerance: float, degree: int) -> Body:
         tuple(draft.faces),
         panel.thickness > 0.0,
         sheet_volume(panel),
+        draft.moved,
     )
+
+
+def _rims(
+    panel: Panel,
+    draft: Draft,
+    skin: Skin,
+    left: tuple[Region, ...],
+    tolerance: float,
+    degree: int,
+) -> Rims:
+    """The edges of all cuts in one strip."""
+    items = [item for region in left for item in (*region.loop, *region.holes)]
+    runs = [item for item in items if isinstance(item, Run)]
+    if not runs:
+        return {}
+    ground = Ground(panel.chain, skin, hair(tolerance))
+    edge = edge_tolerance(draft.size, tolerance)
+    return dict(zip(runs, rims(draft, ground, panel.cuts, runs, edge, degree), strict=True))
 
 
 def _start(strip: Strip, folded: list[Skin]) -> Array | None:
@@ -75,13 +108,17 @@ def _skin(
         )
     if strip.ruled:
         fine = max(tolerance * min(1.0, draft.size / AREA_SIZE), FLOOR * draft.size)
-        return _fitted_skin(strip, draft.corner_points(strip), fine, degree, start)
-    edge = min(tolerance, max(EDGE_TOLERANCE, 3e-12 * draft.size))
-    return _exact_skin(strip, draft, lifts, edge, degree)
+        return _fitted_skin(strip, draft.corner_points(strip), lifts, fine, degree, start)
+    return _exact_skin(strip, draft, lifts, edge_tolerance(draft.size, tolerance), degree)
 
 
 def _fitted_skin(
-    strip: Strip, corners: Array, tolerance: float, degree: int, start: Array | None
+    strip: Strip,
+    corners: Array,
+    lifts: Array,
+    tolerance: float,
+    degree: int,
+    start: Array | None,
 ) -> Skin:
     """A strip whose faces are splines: the surface itself where it is one, else fitted."""
     rails, probe, true = fitted_rails(strip, corners, tolerance, degree, start)
@@ -95,7 +132,7 @@ def _fitted_skin(
     sides = [
         [_rail_piece(strip, s, side, corners, probe, true)] for s, side in enumerate((low, high))
     ]
-    return Skin(strip, tuple(surfaces), (sides[0], sides[1]), None, probe, true)
+    return Skin(strip, tuple(surfaces), (sides[0], sides[1]), lifts, None, probe, true)
 
 
 def _exact_skin(strip: Strip, draft: Draft, lifts: Array, tolerance: float, degree: int) -> Skin:
@@ -117,7 +154,7 @@ def _exact_skin(strip: Strip, draft: Draft, lifts: Array, tolerance: float, degr
         for s in (0, 1)
     ]
     sides = (edges[0].pieces(), edges[1].pieces())
-    return Skin(strip, tuple(surfaces), sides, frame, true=reach)
+    return Skin(strip, tuple(surfaces), sides, lifts, frame, true=reach)
 
 
 def _rail_piece(

@@ -7,14 +7,15 @@ from dataclasses import dataclass
 
 import numpy as np
 from OCP.BRep import BRep_Tool
-from OCP.BRepAdaptor import BRepAdaptor_Surface
+from OCP.BRepAdaptor import BRepAdaptor_Curve, BRepAdaptor_Surface
 from OCP.BRepCheck import BRepCheck_Analyzer
 from OCP.BRepGProp import BRepGProp
 from OCP.collections import (
     IndexedDataMap_TopoDS_Shape_List_TopoDS_Shape_TopTools_ShapeMapHasher as AncestorMap,
 )
-from OCP.Geom import Geom_Curve, Geom_Surface
+from OCP.Geom import Geom_Surface
 from OCP.GeomAbs import (
+    GeomAbs_BSplineCurve,
     GeomAbs_BSplineSurface,
     GeomAbs_Cone,
     GeomAbs_Cylinder,
@@ -33,7 +34,10 @@ from devcad.geometry.fit import FLOOR, Spline, ruled_twist
 from devcad.geometry.taylor import Array
 
 LOOSEST = 1e-6  # mm: edges and vertices must hold closer than this
-VOLUME_EPS = 1e-9  # relative, asked of the kernel's adaptive quadrature
+LARGE, LARGE_GAP = 1e5, 1e-7  # mm, of the size: beyond it the reader fits images of its own
+SKEW: Array = np.array([0.30151, 0.57177, 0.76301])
+GAP_PLACES, PLACES = 2, 8  # a knot of an edge, or on a line: where its image is compared with it
+VOLUME_EPS = AREA_EPS = 1e-9  # relative, asked of the kernel's adaptive quadrature
 
 _KINDS = {
     Plane: GeomAbs_Plane,
@@ -46,11 +50,12 @@ _KINDS = {
 @dataclass(frozen=True, slots=True)
 class Proof:
     """Measured on one body: largest distance from the true surface in mm (0 where exact), largest
-    twist of a skin in radians, and a solid's volume in mm3 (0 for a sheet)."""
+    twist of a skin in radians, a solid's volume in mm3 or a sheet's area in mm2, the other 0."""
 
     deviation: float
     twist: float
     volume: float
+    area: float
 
 
 def prove(bodies: list[Body], shape: TopoDS_Shape, size: float) -> list[Proof]:
@@ -58,7 +63,8 @@ def prove(bodies: list[Body], shape: TopoDS_Shape, size: float) -> list[Proof]:
 
     Raises:
         CheckFailed: not one solid or shell a panel, a shape that is not valid, other faces than
-            were written, a solid that is open, or tolerances above 1e-6 mm (1e-9 of the size).
+            were written, a solid that is open, tolerances above 1e-6 mm (1e-9 of the size), or
+            edges as far off their faces.
     """
     kind = TopAbs_SOLID if bodies[0].solid else TopAbs_SHELL
     found = list(_shapes(shape, kind))
@@ -80,13 +86,17 @@ def _prove(body: Body, shape: TopoDS_Shape, size: float) -> Proof:
     loose = ShapeAnalysis_ShapeTolerance().Tolerance(shape, 1)
     if loose > max(LOOSEST, FLOOR * size):
         raise _wrong(f"edges and vertices hold only to {loose:.3g} mm", body.name)
+    gap = max(_gap(face) for face in faces)
+    if gap > (max(LOOSEST, FLOOR * size) if size < LARGE else LARGE_GAP * size):
+        raise _wrong(f"edges lie {gap:.3g} mm off their faces", body.name)
     measured = [_face(f, s) for f, s in zip(body.faces, faces, strict=True)]
-    deviation = max([d for d, _ in measured] + [_edges(body, shape)])
+    deviation = max([body.moved, _edges(body, shape), *(d for d, _ in measured)])
     fitted = any(isinstance(e.curve, Spline) and not e.curve.exact for e in body.edges)
     return Proof(
         deviation if fitted or deviation > FLOOR * size else 0.0,
         max(w for _, w in measured),
         _volume(shape) if body.solid else 0.0,
+        0.0 if body.solid else _area(shape),
     )
 
 
@@ -145,35 +155,77 @@ def _axis(axis: gp_Ax1) -> tuple[Array, Array]:
     return np.array([p.X(), p.Y(), p.Z()]), np.array([d.X(), d.Y(), d.Z()])
 
 
+def _gap(face: TopoDS_Face) -> float:
+    """How far the edges of a face are from their images on it at equal parameters, mm; a plane
+    has images of no edge."""
+    if BRepAdaptor_Surface(face).GetType() == GeomAbs_Plane:
+        return 0.0
+    worst = 0.0
+    for edge in (TopoDS.Edge(e) for e in _shapes(face, TopAbs_EDGE)):
+        if BRep_Tool.Degenerated_s(edge):
+            continue
+        space, image = BRepAdaptor_Curve(edge), BRepAdaptor_Curve(edge, face)
+        start, end = space.FirstParameter(), space.LastParameter()
+        spline = space.GetType() == GeomAbs_BSplineCurve
+        count = GAP_PLACES * space.NbKnots() if spline else PLACES
+        for k in range(count):
+            s = start + (end - start) * (k + 0.5) / count
+            worst = max(worst, space.Value(s).Distance(image.Value(s)))
+    return worst
+
+
 def _edges(body: Body, shape: TopoDS_Shape) -> float:
     """The largest distance of the fitted edges of exact faces from the true ones.
 
     A reader may turn or renumber edges, so each is found by where its middle lies.
     """
-    planned = [e.probes for e in body.edges if e.probes is not None]
+    planned = [
+        (e.curve, e.probes)
+        for e in body.edges
+        if isinstance(e.curve, Spline) and e.probes is not None and len(e.probes[0])
+    ]
     if not planned:
         return 0.0
     curves = _spline_edges(shape)
+    found = [
+        _curve_values(c, np.array([0.5 * (c.FirstParameter() + c.LastParameter())])) for c in curves
+    ]
+    wanted = [c(np.array([0.5 * (c.knots[0] + c.knots[-1])])) for c, _ in planned]
+    nearest = _nearest(np.concatenate(found), np.concatenate(wanted))
     worst = 0.0
-    for places, points in planned:
-        middle = len(places) // 2
-        at = [_curve_values(c, places[middle : middle + 1])[0] for c in curves]
-        near = int(np.argmin(np.linalg.norm(np.array(at) - points[middle], axis=1)))
-        gap = _curve_values(curves[near], places) - points
+    for k, (_, (places, points)) in zip(nearest, planned, strict=True):
+        gap = _curve_values(curves[k], places) - points
         worst = max(worst, float(np.linalg.norm(gap, axis=1).max()))
     return worst
 
 
-def _spline_edges(shape: TopoDS_Shape) -> list[Geom_Curve]:
+def _nearest(found: Array, wanted: Array) -> list[int]:
+    """Which of the points ``found`` (n, 3) is nearest to each of ``wanted`` (m, 3).
+
+    Looked for along one line first, on which the rows of a pattern fall apart: two points are no
+    farther apart in space than on it.
+    """
+    along, goals = found @ SKEW, wanted @ SKEW
+    order = np.argsort(along)
+    near = 1e-9 * (float(np.abs(found).max()) + 1.0)
+    low, high = np.searchsorted(along[order], [goals - near, goals + near])
+    out = []
+    for point, a, b in zip(wanted, low.tolist(), high.tolist(), strict=True):
+        some = order[a:b] if a < b else order
+        out.append(int(some[np.linalg.norm(found[some] - point, axis=1).argmin()]))
+    return out
+
+
+def _spline_edges(shape: TopoDS_Shape) -> list[BRepAdaptor_Curve]:
     """The curves of all edges that are splines, each once."""
     found = AncestorMap()
     TopExp.MapShapesAndAncestors_s(shape, TopAbs_EDGE, TopAbs_FACE, found)
     edges = [TopoDS.Edge(found.FindKey(k)) for k in range(1, found.Extent() + 1)]
-    curves = [BRep_Tool.Curve_s(e, 0.0, 1.0) for e in edges if not BRep_Tool.Degenerated_s(e)]
-    return [c for c in curves if c is not None and c.IsKind("Geom_BSplineCurve")]
+    curves = [BRepAdaptor_Curve(e) for e in edges if not BRep_Tool.Degenerated_s(e)]
+    return [c for c in curves if c.GetType() == GeomAbs_BSplineCurve]
 
 
-def _curve_values(curve: Geom_Curve, places: Array) -> Array:
+def _curve_values(curve: BRepAdaptor_Curve, places: Array) -> Array:
     points = (curve.Value(s) for s in places.tolist())
     return np.array([(p.X(), p.Y(), p.Z()) for p in points])
 
@@ -193,6 +245,13 @@ def _volume(shape: TopoDS_Shape) -> float:
     """The volume by adaptive quadrature; negative where the shape is inside out."""
     found = GProp_GProps()
     BRepGProp.VolumeProperties_s(shape, found, VOLUME_EPS, True, True)
+    return float(found.Mass())
+
+
+def _area(shape: TopoDS_Shape) -> float:
+    """The area of all faces by adaptive quadrature."""
+    found = GProp_GProps()
+    BRepGProp.SurfaceProperties_s(shape, found, AREA_EPS)
     return float(found.Mass())
 
 

@@ -230,8 +230,8 @@ class LongEdge:
         samples = np.linspace(t[0], t[1], 33)
         probes = (np.zeros(0), self.points(samples))
         if self.chart is None or self.skins is None:
-            arcs = [_plane_arc(x, self.size) for x in probes[1].swapaxes(0, 1)]
-            spans = tuple(_sweep(a, x) for a, x in zip(arcs, probes[1].swapaxes(0, 1), strict=True))
+            arcs = [plane_arc(x, self.size) for x in probes[1].swapaxes(0, 1)]
+            spans = tuple(sweep(a, x) for a, x in zip(arcs, probes[1].swapaxes(0, 1), strict=True))
             return Piece(_two(t), corners, tuple(arcs), spans, (None,) * len(arcs), probes)
         u = self.chart.angle(t)
         start, turn = self.chart.radial(t[:1])[0], self.chart.turn
@@ -342,7 +342,7 @@ def circle_centre(points: Array, size: float) -> Array | None:
     return centre if fits else None
 
 
-def _plane_arc(points: Array, size: float) -> Arc:
+def plane_arc(points: Array, size: float) -> Arc:
     """The arc through points (n, 3) in their order."""
     centre = circle_centre(points, size)
     assert centre is not None
@@ -354,7 +354,7 @@ def _plane_arc(points: Array, size: float) -> Arc:
     return Arc(centre, axis / np.linalg.norm(axis), x, radius)
 
 
-def _sweep(arc: Arc, points: Array) -> tuple[float, float]:
+def sweep(arc: Arc, points: Array) -> tuple[float, float]:
     """The span of an arc that runs through the points (n, 3)."""
     arms = points - arc.centre
     u = np.unwrap(np.arctan2(arms @ np.cross(arc.axis, arc.x), arms @ arc.x))

@@ -53,6 +53,7 @@ from devcad.export._step_body import (
     Straight,
     Surface,
     Trace,
+    Use,
 )
 from devcad.geometry.fit import Spline
 from devcad.geometry.taylor import Array
@@ -103,10 +104,22 @@ def _face(face: Face, plans: tuple[Edge, ...], edges: list[TopoDS_Edge]) -> Topo
     out = TopoDS_Face()
     surface = surface_of(face.surface)
     _BUILDER.MakeFace(out, surface, TOLERANCE)
+    for loop in (face.loop, *face.holes):
+        _BUILDER.Add(out, _wire(loop, face, surface, plans, edges))
+    return out.Reversed() if face.flipped else out
+
+
+def _wire(
+    loop: tuple[Use, ...],
+    face: Face,
+    surface: Geom_Surface,
+    plans: tuple[Edge, ...],
+    edges: list[TopoDS_Edge],
+) -> TopoDS_Wire:
+    """A loop of a face; the edges learn their images on its surface."""
     wire = TopoDS_Wire()
     _BUILDER.MakeWire(wire)
-    uses = reversed(face.loop) if face.flipped else face.loop
-    for use in uses:
+    for use in reversed(loop) if face.flipped else loop:
         edge, plan = edges[use.edge], plans[use.edge]
         if use.trace is not None:
             _BUILDER.UpdateEdge(
@@ -116,8 +129,7 @@ def _face(face: Face, plans: tuple[Edge, ...], edges: list[TopoDS_Edge]) -> Topo
         oriented = edge if use.forward != face.flipped else edge.Reversed()
         _BUILDER.Add(wire, oriented)
     wire.Closed(True)
-    _BUILDER.Add(out, wire)
-    return out.Reversed() if face.flipped else out
+    return wire
 
 
 def surface_of(surface: Surface) -> Geom_Surface:

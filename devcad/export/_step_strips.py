@@ -13,6 +13,7 @@ from itertools import pairwise
 import numpy as np
 
 from devcad.errors import GeometryError
+from devcad.export._step_borders import clear, extents, parted
 from devcad.geometry import taylor
 from devcad.geometry.classify import Shape, classify
 from devcad.geometry.conic import arc_borders
@@ -24,6 +25,7 @@ from devcad.part import Panel
 FITTED_PARTS = 4  # general-purpose area and volume rules need closed surfaces in quarters
 ANALYTIC_PARTS = 2  # no seam edge, no face of a whole turn
 SMOOTH_SPEED = 1e-7  # relative jump of the derivative that a C1 spline may smooth over
+ASIDE = 0.25  # of a part: how far a border of ours moves to be clear of holes
 MOST_BREAKS = 64  # a curve through hundreds of points is no chain of lines and arcs
 SAMPLES = 257
 
@@ -33,7 +35,7 @@ class Strip:
     """The part of a patch that becomes one face (and its walls), over ``course`` in t.
 
     ``first`` and ``last`` are its stations; ``tips`` tells for each side whether the middle
-    surface ends there in one point, the apex.
+    surface ends there in one point, the apex. The patch is number ``number`` of the chain.
     """
 
     patch: Patch
@@ -43,6 +45,7 @@ class Strip:
     first: int
     last: int
     tips: tuple[bool, bool]
+    number: int = 0
 
     @property
     def ends(self) -> Array:
@@ -109,11 +112,14 @@ def strips(panel: Panel) -> tuple[list[Strip], int]:
     around = chain.closed and chain.orientable
     out: list[Strip] = []
     size = panel_size(panel)
-    for patch, shape in zip(chain.patches, panel.shapes, strict=True):
-        whole = Strip(patch, shape, layers, _plain(patch.segments), 0, 1, _tips(patch, size))
-        for kind, course in _pieces(whole, around and len(chain.patches) == 1):
-            k = len(out)
-            out.append(Strip(patch, kind, layers, course, k, k + 1, whole.tips))
+    for number, (patch, shape) in enumerate(zip(chain.patches, panel.shapes, strict=True)):
+        tips = _tips(patch, size)
+        whole = Strip(patch, shape, layers, _plain(patch.segments), 0, 1, tips, number)
+        holes = extents(panel.cuts, number)
+        for kind, piece in _pieces(whole, around and len(chain.patches) == 1, holes):
+            for course in parted(piece, holes):
+                k = len(out)
+                out.append(replace(whole, shape=kind, course=course, first=k, last=k + 1))
     count = len(out) if around else len(out) + 1
     out[-1] = replace(out[-1], last=out[-1].last % count)
     return out, count
@@ -172,7 +178,7 @@ def _speed_ratio(
     return 1.0 if abs(ratio - 1.0) <= SMOOTH_SPEED else ratio
 
 
-def _analytic_cuts(strip: Strip, alone: bool) -> Array:
+def _analytic_cuts(strip: Strip, alone: bool, holes: Array) -> Array:
     """Where a plane, cylinder or cone is cut: in halves of its turning when it closes alone, and
     into pieces below a whole turn."""
     start, end = strip.ends
@@ -182,7 +188,8 @@ def _analytic_cuts(strip: Strip, alone: bool) -> Array:
     if turning[-1] >= 2.0 * np.pi * (1.0 - 1e-6):
         parts = max(parts, int(np.ceil(turning[-1] / np.pi - 1e-6)))
     inner = np.interp(turning[-1] * np.arange(1, parts) / parts, turning, t)
-    return np.concatenate([[start], inner, [end]])
+    reach = ASIDE * (end - start) / parts
+    return np.array([start, *(clear(place, holes, reach) for place in inner.tolist()), end])
 
 
 def _turning(patch: Patch, t: Array) -> Array:
@@ -198,16 +205,17 @@ def _turning(patch: Patch, t: Array) -> Array:
     return np.concatenate([[0.0], np.cumsum(np.hypot(*steps))])
 
 
-def _pieces(whole: Strip, alone: bool) -> list[tuple[Shape, Course]]:
-    """The faces of a patch: what each is, and its course in t."""
+def _pieces(whole: Strip, alone: bool, holes: Array) -> list[tuple[Shape, Course]]:
+    """The faces of a patch: what each is, and its course in t; where only we cut, clear of the
+    ``holes`` (n, 2)."""
     segments = whole.patch.segments
     if whole.shape.analytic:
-        cuts = _analytic_cuts(whole, alone)
+        cuts = _analytic_cuts(whole, alone, holes)
         return [(whole.shape, _plain(_within(segments, a, b))) for a, b in pairwise(cuts)]
     runs = [part for run in _runs(whole) for part in _arcs_apart(whole, run)]
     pieces = _smooth_pieces(whole, runs, [])
     if alone and len(pieces) < FITTED_PARTS:
-        pieces = _smooth_pieces(whole, runs, _quarters(whole))
+        pieces = _smooth_pieces(whole, runs, _quarters(whole, holes))
     return pieces
 
 
@@ -274,8 +282,8 @@ def _smooth_pieces(whole: Strip, runs: list[_Run], cuts: list[float]) -> list[tu
     return out
 
 
-def _quarters(whole: Strip) -> list[float]:
-    """Parameters at the quarters of a patch's length, or at a break close by."""
+def _quarters(whole: Strip, holes: Array) -> list[float]:
+    """Parameters at the quarters of a patch's length, or at a break close by, clear of holes."""
     start, end = whole.ends
     t = np.linspace(start, end, SAMPLES)
     middle = whole.rails(t).mean(axis=(1, 2))
@@ -286,7 +294,8 @@ def _quarters(whole: Strip) -> list[float]:
         near = int(np.argmin(np.abs(cuts - b)))
         if abs(cuts[near] - b) < 0.05 * (end - start):
             cuts[near] = b
-    return [float(c) for c in np.unique(cuts)]
+    reach = ASIDE * float(np.diff(cuts).min())
+    return [clear(float(c), holes, reach) for c in np.unique(cuts)]
 
 
 def _tips(patch: Patch, size: float) -> tuple[bool, bool]:

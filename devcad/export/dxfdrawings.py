@@ -1,10 +1,10 @@
 """Drawings on the sheet as DXF entities, and their measurement: a LINE where straight, an ARC or
 CIRCLE where one arc, else an open LWPOLYLINE with bulges (R12: POLYLINE), or a chain with
-splines. Each stands on its own layer, behind that layer's reference lines."""
+splines. Lines of a mark that follow one another are one stroke. Each stands on its own layer,
+behind that layer's reference lines."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path as FilePath
 from typing import Any
@@ -13,35 +13,35 @@ import numpy as np
 
 from devcad.export.binary import torn
 from devcad.export.dxfsplines import JOINED, add_chains, edge_deviation
-from devcad.export.outline import strokes, strokes_deviation
+from devcad.export.outline import fitted_strokes, strokes_deviation
+from devcad.export.profile import Style
 from devcad.flatten import loops
+from devcad.flatten.edges import strokes
 from devcad.flatten.loops import Path
 from devcad.flatten.splines2d import spline_edge
 from devcad.flatten.trace import Trace, trace, turns
 from devcad.geometry.taylor import Array
 from devcad.part import Panel
 
-Style = Callable[[str], dict[str, Any]]
-"""Layer -> the attributes of its entities."""
 READBACK = "dxf-readback"
 
 
-def add_drawings(space: Any, panel: Panel, limit: float, curves: str, style: Style) -> None:
+def add_drawings(space: Any, panel: Panel, limit: float, how: Style) -> None:
     """Write the pattern's drawings in order, within ``limit`` (mm) of the true curves.
 
     Raises:
         CheckFailed: the limit cannot be kept.
     """
     pattern = panel.pattern
-    if curves == "spline":
+    if how.curves == "spline":
         for edge in pattern.drawings:
-            add_chains(space, (spline_edge(edge, limit),), style(edge.name))
+            add_chains(space, (spline_edge(edge, limit),), how.attributes(edge.name))
         return
-    for edge, path in zip(pattern.drawings, strokes(pattern, limit, curves), strict=True):
-        _add_path(space, path, style(edge.name))
+    for role, path in fitted_strokes(pattern, limit, how.curves):
+        _add_path(space, path, how.attributes(role), old=how.old_polylines)
 
 
-def _add_path(space: Any, path: Path, style: dict[str, Any]) -> None:
+def _add_path(space: Any, path: Path, style: dict[str, Any], *, old: bool) -> None:
     start, end = path.points[0].tolist(), path.points[-1].tolist()
     if len(path.bulges) == 1 and path.bulges[0] == 0.0:
         space.add_line(start, end, dxfattribs=style)
@@ -49,7 +49,7 @@ def _add_path(space: Any, path: Path, style: dict[str, Any]) -> None:
     arc = loops.arc(path)
     if arc is None:
         rows = np.column_stack([path.points, np.append(path.bulges, 0.0)]).tolist()
-        if space.doc.dxfversion == "AC1009":
+        if old:
             space.add_polyline2d(rows, format="xyb", dxfattribs=style)
         else:
             space.add_lwpolyline(rows, format="xyb", dxfattribs=style)
@@ -62,24 +62,25 @@ def _add_path(space: Any, path: Path, style: dict[str, Any]) -> None:
     space.add_arc(centre.tolist(), radius, float(first), float(last), dxfattribs=style)
 
 
-def drawings_deviation(
-    space: Any, panel: Panel, limit: float, path: FilePath, *, splines: bool
-) -> float:
+def drawings_deviation(space: Any, panel: Panel, limit: float, path: FilePath, how: Style) -> float:
     """The largest distance in mm between the drawings as read and the true curves, 0 where exact.
+    On its layer a drawing stands behind the reference lines, in the order of the pattern.
 
     Raises:
         CheckFailed: dxf-readback, when there are too few or too many entities.
     """
     drawings, lines = panel.pattern.drawings, panel.pattern.lines
+    on = {name: role.layer for name, role in how.profile.roles.items()}
     left: dict[str, list[Any]] = {}
-    for layer in dict.fromkeys(edge.name for edge in drawings):
-        before = sum(line.layer == layer for line in lines)
+    for layer in dict.fromkeys(on[edge.name] for edge in drawings):
+        before = sum(on[line.layer] == layer for line in lines)
         left[layer] = [entity for entity in space if entity.dxf.layer == layer][before:]
-    traces = [trace(edge, limit / 50.0) for edge in drawings]
-    if splines:
-        worst = max((_chain(left[t.edge.name], t, panel, path) for t in traces), default=0.0)
+    if how.curves == "spline":
+        traces = [trace(edge, limit / 50.0) for edge in drawings]
+        worst = max((_chain(left[on[t.edge.name]], t, panel, path) for t in traces), default=0.0)
     else:
-        read = [_path(left[t.edge.name], t, panel, path) for t in traces]
+        traces = [trace(stroke[0], limit / 50.0) for stroke in strokes(drawings)]
+        read = [_path(left[on[t.edge.name]], t, panel, path) for t in traces]
         worst = strokes_deviation(read, panel.pattern, limit)
     if any(left.values()):
         raise torn(READBACK, path, "more drawings were read than written", panel=panel.name)
@@ -96,7 +97,7 @@ def _chain(entities: list[Any], traced: Trace, panel: Panel, path: FilePath) -> 
 
 
 def _path(entities: list[Any], traced: Trace, panel: Panel, path: FilePath) -> Path:
-    """One drawing as it was read, taken from the front of the list, in its curve's direction."""
+    """One stroke as it was read, taken from the front of the list, in its curve's direction."""
     if not entities:
         raise torn(READBACK, path, "a drawing is missing", panel=panel.name)
     entity = entities.pop(0)

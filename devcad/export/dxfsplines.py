@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path as FilePath
 from typing import Any
 
@@ -52,24 +53,26 @@ def _add_segment(space: Any, start: Array, end: Array, bulge: float, style: dict
 
 
 def chain_deviation(
-    space: Any, panel: Panel, layers: tuple[str, str], limit: float, path: FilePath
+    space: Any, panel: Panel, layers: Sequence[str], limit: float, path: FilePath
 ) -> float:
-    """The largest distance in mm between the chains as read and the pattern's true curves.
+    """The largest distance in mm between the chains as read and the pattern's true curves;
+    ``layers`` are those of the holes in their order and the outline's.
 
     Raises:
         CheckFailed: dxf-readback, when entities are missing or ends do not meet.
     """
-    outer, inner = ([e for e in space if e.dxf.layer == layer] for layer in layers)
-    left = {layers[0]: outer, layers[1]: inner}
+    left = {layer: [e for e in space if e.dxf.layer == layer] for layer in layers}
     worst = 0.0
-    for k, edges in enumerate((panel.pattern.outline, *panel.pattern.holes)):
-        entities = left[layers[1] if k else layers[0]]
-        found = _contour_deviation(entities, edges, limit, panel.name, path)
+    contours = (*panel.pattern.holes, panel.pattern.outline)
+    for edges, layer in zip(contours, layers, strict=True):
+        found = _contour_deviation(left[layer], edges, limit, panel.name, path)
         worst = max(worst, found)
-    if outer or inner:
+    if any(left.values()):
         raise torn("dxf-readback", path, "more contours were read than written", panel=panel.name)
     x0, y0, x1, y1 = panel.pattern.bbox
-    exact = worst <= JOINED * max(x1 - x0, y1 - y0) and not space.query("SPLINE")
+    exact = worst <= JOINED * max(x1 - x0, y1 - y0) and not any(
+        entity.dxftype() == "SPLINE" for entity in space
+    )
     return 0.0 if exact else worst
 
 

@@ -57,6 +57,71 @@ def published(out: Path, name: str) -> Iterator[Path]:
                 out.rmdir()
 
 
+@contextmanager
+def published_files(out: Path, listing: str) -> Iterator[Path]:
+    """A staging folder whose files appear in OUT together when the block ends well.
+
+    ``listing`` is one of them, JSON whose "files" name the others, as a report's do. What an
+    earlier listing in OUT names goes; what else is in OUT stays. Where a file cannot be moved in,
+    OUT is put back as it was.
+
+    Raises:
+        FileError: OUT cannot be written, or has a file of that name that its listing does not
+        name.
+    """
+    fresh = done = False
+    try:
+        _refuse_file_in_the_way(out)
+        fresh = not out.exists()
+        out.mkdir(parents=True, exist_ok=True)
+        with _staging(out, Path(listing).stem) as staging:
+            yield staging
+            _synchronise(staging)
+            _move_in(staging, out, listing)
+            done = True
+    except DevcadError:
+        raise
+    except OSError as error:
+        raise unwritable(out, error) from error
+    finally:
+        if fresh and not done:
+            with suppress(OSError):
+                out.rmdir()
+
+
+def _move_in(staging: Path, out: Path, listing: str) -> None:
+    """Move the files of a staging folder into OUT in place of those that are listed there; the
+    listing goes first and comes last, so that a complete set is one with its listing."""
+    new = sorted(
+        (path.name for path in staging.iterdir()), key=lambda name: (name == listing, name)
+    )
+    listed = _listed(out / listing, listing)
+    old = [listing, *sorted(listed - {listing})]
+    old = [name for name in old if Path(name).name == name and (out / name).is_file()]
+    for name in new:
+        if name not in old and os.path.lexists(out / name):
+            raise _refused(
+                out,
+                f'cannot replace "{name}": {listing} does not say that it belongs to it',
+                name,
+                "move it elsewhere, or choose another folder with -o",
+            )
+    aside = staging / "old"
+    aside.mkdir()
+    moves = [(out / name, aside / name) for name in old]
+    moves += [(staging / name, out / name) for name in new]
+    made: list[tuple[Path, Path]] = []
+    try:
+        for start, end in moves:
+            start.rename(end)
+            made.append((start, end))
+    except BaseException:
+        for start, end in reversed(made):
+            end.rename(start)
+        raise
+    _synchronise_entries(out)
+
+
 def publish_file(out: Path, name: str, data: bytes) -> Path:
     """Write OUT/name, whole or not at all, in place of an earlier one; returns its path.
 
@@ -156,16 +221,16 @@ def _unlisted(target: Path) -> list[str]:
     """The entries of a folder that its report does not list; a bad report lists nothing."""
     with suppress(FileNotFoundError):
         entries = sorted(target.iterdir())
-        listed = _listed(target / REPORT) | LITTER
+        listed = _listed(target / REPORT, REPORT) | LITTER
         return [path.name for path in entries if path.name not in listed or path.is_dir()]
     return []
 
 
-def _listed(report: Path) -> set[str]:
-    """The names of the files that a report speaks of, its own included."""
+def _listed(report: Path, own: str) -> set[str]:
+    """The names of the files that a report speaks of, its ``own`` included."""
     try:
         files = json.loads(report.read_bytes())["files"]
-        return {REPORT, *(str(file["path"]) for file in files)}
+        return {own, *(str(file["path"]) for file in files)}
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return set()
 

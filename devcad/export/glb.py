@@ -1,10 +1,10 @@
 """glTF 2.0 binary: metres, Y up, UV0 = the flat pattern; one node and one mesh a panel.
 
 A vertex (x, y, z) in mm is written as (x, z, -y) / 1000, its pattern place (X, Y) as
-((X - xmin) / L, 1 - (Y - ymin) / L). L is one number for the whole file, the largest side of
-all the panels' patterns, so that a texture has one scale; xmin and ymin are each panel's own,
-so that the charts of several panels lie over one another in [0, 1]. Nothing packs them side by
-side yet.
+((X - xmin + dx) / L, 1 - (Y - ymin + dy) / L). L is one number for the whole file, so that a
+texture has one scale: the larger side of the pattern or, of several, of the atlas in which they
+lie side by side. xmin and ymin are each panel's own; (dx, dy) is 0 for one panel and stands in
+its ``uv_offset_mm`` for several.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from devcad import __version__
 from devcad.checks import Check, at_most
 from devcad.errors import LimitError
 from devcad.export import Options, Written
+from devcad.export.atlas import atlas
 from devcad.export.binary import FLOAT32_STEP, apart, blocks, bounds, demanded, opened, torn
 from devcad.geometry.taylor import Array
 from devcad.part import Panel, Part
@@ -47,12 +48,14 @@ NORMAL_LIMIT = 1e-6
 
 @dataclass(frozen=True, slots=True)
 class _Piece:
-    """A panel with its indices, flat (3 m,) unsigned, and the affine map of its pattern to UV."""
+    """A panel with its indices, flat (3 m,) unsigned, and the affine map of its pattern to UV:
+    ``corner`` is where the atlas begins, ``offset`` how far the pattern lies from there."""
 
     panel: Panel
     indices: NDArray[Any]
     corner: tuple[float, float]
     side: float
+    offset: tuple[float, float] | None = None
 
     @property
     def sizes(self) -> tuple[int, int, int, int]:
@@ -117,13 +120,14 @@ def _padded(size: int) -> int:
 
 
 def _pieces(part: Part) -> list[_Piece]:
-    """The panels in order, with one texture scale."""
-    boxes = [panel.pattern.bbox for panel in part.panels]
-    side = max(max(box[2] - box[0], box[3] - box[1]) for box in boxes)
-    return [
-        _Piece(panel, _indices(panel), (box[0], box[1]), side)
-        for panel, box in zip(part.panels, boxes, strict=True)
-    ]
+    """The panels in order, side by side on one texture."""
+    placed = atlas([p.pattern for p in part.panels], [p.mesh.deviation for p in part.panels])
+    pieces = []
+    for panel, (dx, dy) in zip(part.panels, placed.offsets.tolist(), strict=True):
+        x, y = panel.pattern.bbox[:2]
+        offset = (dx, dy) if len(part.panels) > 1 else None
+        pieces.append(_Piece(panel, _indices(panel), (x - dx, y - dy), placed.side, offset))
+    return pieces
 
 
 def _indices(panel: Panel) -> NDArray[Any]:
@@ -213,7 +217,8 @@ def _document(part: Part, pieces: list[_Piece]) -> Json:
 def _extras(piece: _Piece, common: Json) -> Json:
     """A panel's facts; on node and mesh, for viewers show one of the two."""
     panel = piece.panel
-    return common | {"thickness": panel.thickness, "area": panel.pattern.area}
+    facts = common | {"thickness": panel.thickness, "area": panel.area}
+    return facts if piece.offset is None else facts | {"uv_offset_mm": list(piece.offset)}
 
 
 def _mesh(piece: _Piece, k: int, common: Json) -> Json:

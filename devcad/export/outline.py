@@ -7,16 +7,20 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path as FilePath
 
+import numpy as np
+
 from devcad.errors import JobError
-from devcad.export import panel_path
+from devcad.export import Options, panel_path, profile
 from devcad.export.binary import torn
 from devcad.flatten import loops
 from devcad.flatten.arcs import fit_edge, fit_outline
+from devcad.flatten.edges import strokes
 from devcad.flatten.loops import Loop, Path
 from devcad.flatten.measure import deviation, loop_deviation
-from devcad.flatten.pattern import Edge, Pattern
+from devcad.flatten.pattern import STITCH, Edge, Pattern
 from devcad.flatten.polylines import polyline_edge, polyline_outline
 from devcad.flatten.trace import trace
+from devcad.geometry.taylor import Array
 from devcad.part import Panel, Part
 
 EXACT = 1e-9  # of the pattern's size: below it a recognised line or arc counts as exact
@@ -24,6 +28,17 @@ ROUNDING = 1e-11  # of the pattern's size: the accuracy of its outline, 1e-9 mm 
 
 FITS = {"arcs": fit_outline, "polyline": polyline_outline}
 EDGE_FITS: dict[str, Callable[[Edge, float], Path]] = {"arcs": fit_edge, "polyline": polyline_edge}
+
+
+def plane_curves(options: Options) -> str:
+    """The curves of a drawing that is no DXF, by the word for DXF: arcs for splines and where
+    nothing is said."""
+    return "arcs" if options.dxf_curves in (None, "spline") else str(options.dxf_curves)
+
+
+def hole_role(hole: tuple[Edge, ...]) -> str:
+    """What a hole is for, by the name of its edges."""
+    return profile.STITCH if hole[0].name == STITCH else profile.INNER
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,10 +73,26 @@ def contours(pattern: Pattern, tolerance: float, curves: str) -> Contours:
     return Contours(fit(pattern.outline, tolerance), holes)
 
 
-def strokes(pattern: Pattern, tolerance: float, curves: str) -> tuple[Path, ...]:
-    """The drawings of a pattern as open paths of lines and arcs, or of straight segments, within
-    ``tolerance`` (mm), in order; ``curves`` as in :func:`contours`."""
-    return tuple(EDGE_FITS[curves](edge, tolerance) for edge in pattern.drawings)
+def fitted_strokes(pattern: Pattern, tolerance: float, curves: str) -> tuple[tuple[str, Path], ...]:
+    """The drawings of a pattern, stroke by stroke, as layers and open paths of lines and arcs, or
+    of straight segments, within ``tolerance`` (mm), in order; ``curves`` as in :func:`contours`."""
+    fit = EDGE_FITS[curves]
+    return tuple(
+        (stroke[0].name, _end_to_end([fit(edge, tolerance) for edge in stroke]))
+        for stroke in strokes(pattern.drawings)
+    )
+
+
+def _end_to_end(paths: list[Path]) -> Path:
+    """Paths that follow one another as one."""
+    if len(paths) == 1:
+        return paths[0]
+    return Path(
+        np.concatenate([*(path.points[:-1] for path in paths), paths[-1].points[-1:]]),
+        np.concatenate([path.bulges for path in paths]),
+        all(path.exact for path in paths),
+        max(path.deviation for path in paths),
+    )
 
 
 def drawing_path(
@@ -70,23 +101,40 @@ def drawing_path(
     """The path of a panel's drawing: -approximate where the surface twists and the pattern is no
     isometric one, then ``mark``, then the suffix."""
     path = panel_path(part, panel.name, folder, suffix)
-    twisted = any(
+    stem = path.name.removesuffix(f".{suffix}")
+    about = "-approximate" if approximate(part, panel) else ""
+    return path.with_name(f"{stem}{about}{mark}.{suffix}")
+
+
+def approximate(part: Part, panel: Panel) -> bool:
+    """Whether the panel's surface twists, so that its pattern is no isometric one."""
+    return any(
         check.name in ("twist", "isometry") and not check.passed and check.panel in ("", panel.name)
         for check in part.checks
     )
-    stem = path.name.removesuffix(f".{suffix}")
-    return path.with_name(f"{stem}{'-approximate' if twisted else ''}{mark}.{suffix}")
 
 
 def strokes_deviation(read: Sequence[Path], pattern: Pattern, limit: float) -> float:
-    """The largest distance in mm between the drawings that were read, each in the direction of
+    """The largest distance in mm between the strokes that were read, each in the direction of
     its curve, and the true ones; what is below 1e-9 of the pattern's size counts as 0."""
     size = longer_side(pattern)
     worst = 0.0
-    for path, edge in zip(read, pattern.drawings, strict=True):
-        found = deviation(trace(edge, limit / 5.0), path.points, path.bulges)
-        worst = max(worst, 0.0 if found <= EXACT * size else found)
+    for path, stroke in zip(read, strokes(pattern.drawings), strict=True):
+        traces = [trace(edge, limit / 5.0) for edge in stroke]
+        at = _corners(path, [traced.points[-1] for traced in traces[:-1]])
+        for traced, i, j in zip(traces, at[:-1], at[1:], strict=True):
+            found = deviation(traced, path.points[i : j + 1], path.bulges[i:j])
+            worst = max(worst, 0.0 if found <= EXACT * size else found)
     return worst
+
+
+def _corners(path: Path, corners: list[Array]) -> list[int]:
+    """The vertices of a path at its start, at the corners (2,) in their order, and at its end."""
+    found = [0]
+    for left, corner in zip(range(len(corners), 0, -1), corners, strict=True):
+        ahead = path.points[found[-1] + 1 : len(path.points) - left]
+        found.append(found[-1] + 1 + int(np.argmin(np.hypot(*(ahead - corner).T))))
+    return [*found, len(path.bulges)]
 
 
 def measured(read: Contours, panel: Panel, limit: float, path: FilePath, name: str) -> float:

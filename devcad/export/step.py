@@ -8,17 +8,19 @@ again on the file as a fresh reader sees it.
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
 
 from devcad.checks import Check, at_most
-from devcad.errors import DevcadError
+from devcad.errors import DevcadError, GeometryError
 from devcad.export import Options, Written
 from devcad.export._step_body import Body
 from devcad.export._step_file import read_step, write_step
 from devcad.export._step_plan import body
 from devcad.export._step_proof import Proof, prove
+from devcad.export._step_seams import SEWN, coinciding, shared
 from devcad.export._step_shape import shape_of
 from devcad.export._step_strips import panel_size
 from devcad.geometry.fit import FLOOR, TWIST_LIMIT
@@ -26,7 +28,7 @@ from devcad.part import Panel, Part
 
 SHARE = 0.1  # of the job's tolerance
 TOLERANCE = 1e-4  # mm, at most, unless the recipe says otherwise
-VOLUME_LIMIT = 1e-5  # relative
+CONTENT_LIMIT = 1e-5  # relative, of volume and area
 
 
 def write(part: Part, folder: Path, options: Options) -> list[Written]:
@@ -37,26 +39,53 @@ def write(part: Part, folder: Path, options: Options) -> list[Written]:
 
     Returns:
         the file with its largest deviation in mm (0 where all faces and edges are exact) and, for
-        every panel, the checks step-deviation, step-twist and, for a solid, volume.
+        every panel, the checks step-deviation, step-twist, and volume or, for a sheet, area; for
+        every seam of sheets step-seam.
     Raises:
         GeometryError: a fit is out of reach, or the panel's thickness has no closed form there.
         CheckFailed: the file does not read back as written (step-valid). FileError: not writable.
     """
-    tolerance = options.step_tolerance or min(SHARE * part.tolerance, TOLERANCE)
+    return [written(part, folder / f"{part.name}.step", "step", options)]
+
+
+def written(part: Part, path: Path, format: str, options: Options) -> Written:
+    """Write the part's bodies to one file of that format and prove it; as :func:`write`."""
+    tolerance = step_tolerance(part, options)
     size = max(panel_size(p) for p in part.panels)
-    bodies = [_body(p, tolerance, options.step_degree) for p in part.panels]
-    path = folder / f"{part.name}.step"
-    shapes = [(b.name, shape_of(b)) for b in bodies]
-    write_step(path, part.name, shapes, part.colour, options.step_schema)
-    proofs = prove(bodies, read_step(path), size)
-    checks: list[Check] = []
-    for panel, plan, proof in zip(part.panels, bodies, proofs, strict=True):
+    plans, checks = bodies(part, tolerance, options.step_degree)
+    shapes = [(b.name, shape_of(b)) for b in plans]
+    cut = any(panel.cuts for panel in part.panels)
+    write_step(path, part.name, shapes, part.colour, options.step_schema, sparing=cut)
+    proofs = prove(plans, read_step(path), size)
+    for panel, plan, proof in zip(part.panels, plans, proofs, strict=True):
         checks += _checks(panel, plan, proof, tolerance)
-    return [Written(path, "step", max(p.deviation for p in proofs), tuple(checks))]
+    return Written(path, format, max(p.deviation for p in proofs), tuple(checks))
 
 
-def _body(panel: Panel, tolerance: float, degree: int) -> Body:
-    """The body of a panel; failures are told with the panel's name."""
+def bodies(part: Part, tolerance: float, degree: int) -> tuple[list[Body], list[Check]]:
+    """The bodies of a part's panels, fitted within ``tolerance`` (mm), and for every seam the
+    check step-seam.
+
+    Raises:
+        GeometryError: as :func:`write`.
+    """
+    seams = coinciding(part)
+    meeting = {k for seam in seams for k in seam.panels}
+    planned = [_body(p, tolerance, degree, sewn=k in meeting) for k, p in enumerate(part.panels)]
+    return shared(planned, seams, tolerance)
+
+
+def step_tolerance(part: Part, options: Options) -> float:
+    """How closely faces and edges are fitted, mm."""
+    return options.step_tolerance or min(SHARE * part.tolerance, TOLERANCE)
+
+
+def _body(panel: Panel, tolerance: float, degree: int, *, sewn: bool = False) -> Body:
+    """The body of a panel; failures are told with the panel's name. One that is to be ``sewn`` to
+    others is fitted more closely, if it can be."""
+    if sewn and tolerance > SEWN:
+        with suppress(GeometryError):
+            return body(panel, SEWN, degree)
     try:
         return body(panel, tolerance, degree)
     except DevcadError as error:
@@ -86,17 +115,23 @@ def _checks(panel: Panel, plan: Body, proof: Proof, tolerance: float) -> list[Ch
             remedy="lower step.tolerance",
         ),
     ]
-    if plan.solid:
-        share = abs(proof.volume / plan.volume - 1.0)
-        checks.append(
-            at_most(
-                "volume",
-                panel.name,
-                share,
-                VOLUME_LIMIT,
-                "relative",
-                says=f"the STEP solid's volume is off area x thickness by {share:.3g}",
-                remedy="lower step.tolerance, or reduce the thickness",
-            )
-        )
+    checks.append(content(plan, proof, panel.area, tolerance))
     return checks
+
+
+def content(plan: Body, proof: Proof, area: float, tolerance: float) -> Check:
+    """That a solid has its volume, a sheet body its ``area``: this within 1e-5 at the default
+    tolerance and in proportion where a coarser fit is asked for."""
+    if plan.solid:
+        share, limit = abs(proof.volume / plan.volume - 1.0), CONTENT_LIMIT
+        name, of = "volume", "the STEP solid's volume is off area x thickness"
+        remedy = "lower step.tolerance, or reduce the thickness"
+    else:
+        share, limit = abs(proof.area / area - 1.0), CONTENT_LIMIT * max(1.0, tolerance / TOLERANCE)
+        name, of, remedy = (
+            "area",
+            "the STEP sheet's area is off the panel's",
+            "lower step.tolerance",
+        )
+    says = f"{of} by {share:.3g}"
+    return at_most(name, plan.name, share, limit, "relative", says=says, remedy=remedy)

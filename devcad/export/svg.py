@@ -22,10 +22,13 @@ from devcad.export.outline import (
     Contours,
     contours,
     drawing_path,
+    fitted_strokes,
+    hole_role,
     measured,
-    strokes,
+    plane_curves,
     strokes_deviation,
 )
+from devcad.export.profile import INNER, OUTER, STITCH
 from devcad.export.svgpaths import (
     NAMESPACE,
     closed_path,
@@ -35,26 +38,40 @@ from devcad.export.svgpaths import (
     read_open,
     straight_path,
 )
+from devcad.flatten.edges import strokes
 from devcad.flatten.loops import Path
 from devcad.geometry.taylor import Array
 from devcad.part import Panel, Part
 
+Strokes = tuple[tuple[str, Path], ...]
+"""Layers and paths of drawings."""
 READBACK = "svg-readback"
 MARGIN = 1.0  # mm around the pattern, so that strokes on its border are seen whole
 STROKE = 0.1  # mm
 SHARE = 0.1  # of the part's tolerance goes into the drawing
-OUTER, INNER = "CUT_OUTER", "CUT_INNER"
-COLOURS = {  # in the order of the file
+COLOURS = {  # in the order of the file; the guides' are those that laser programs do not run
     "RULING": "#F36926",
+    "GRAIN": "#F36926",
+    "GLUE": "#F36926",
+    "SEW": "#0C96D9",
     "BEND_UP": "#00E000",
     "BEND_DOWN": "#00E000",
     "SCORE": "#00E000",
     "ENGRAVE": "#FF0000",
     "MARK": "#FF0000",
+    "NOTCH_MARK": "#FF0000",
+    "LABEL": "#FF0000",
+    STITCH: "#0000FF",
     INNER: "#0000FF",
     OUTER: "#000000",
 }
-DASHES = {"RULING": "1 1", "BEND_UP": "4 2", "BEND_DOWN": "4 2"}  # mm
+DASHES = {  # mm
+    "RULING": "1 1",
+    "BEND_UP": "4 2",
+    "BEND_DOWN": "4 2",
+    "GLUE": "0.5 1",
+    "SEW": "3 1.5",
+}
 
 
 def svg_origin(panel: Panel) -> tuple[float, float]:
@@ -82,9 +99,9 @@ def write(part: Part, folder: FilePath, options: Options) -> list[Written]:
 def _write_panel(part: Part, panel: Panel, folder: FilePath, options: Options) -> Written:
     path = drawing_path(part, panel, folder, "svg")
     limit = SHARE * part.tolerance
-    curves = "arcs" if options.dxf_curves == "spline" else options.dxf_curves
+    curves = plane_curves(options)
     cuts = contours(panel.pattern, limit, curves)
-    drawn = strokes(panel.pattern, limit, curves)
+    drawn = fitted_strokes(panel.pattern, limit, curves)
     name = part.name if len(part.panels) == 1 else f"{part.name} {panel.name}"
     text = "\n".join(_document(name, panel, cuts, drawn))
     with opened(path, "wb") as stream:
@@ -106,7 +123,7 @@ def _write_panel(part: Part, panel: Panel, folder: FilePath, options: Options) -
     return Written(path, "svg", found, demanded([check], path))
 
 
-def _document(name: str, panel: Panel, cuts: Contours, drawn: tuple[Path, ...]) -> Iterator[str]:
+def _document(name: str, panel: Panel, cuts: Contours, drawn: Strokes) -> Iterator[str]:
     """The lines of the file."""
     xmin, ymin, xmax, ymax = panel.pattern.bbox
     width = number(xmax - xmin + 2.0 * MARGIN)
@@ -132,18 +149,17 @@ def _document(name: str, panel: Panel, cuts: Contours, drawn: tuple[Path, ...]) 
     yield "</svg>"
 
 
-def _paths(
-    panel: Panel, cuts: Contours, drawn: tuple[Path, ...], origin: Array, layer: str
-) -> list[str]:
+def _paths(panel: Panel, cuts: Contours, drawn: Strokes, origin: Array, layer: str) -> list[str]:
     """The path data of a layer: contours, or its reference lines and behind them its drawings."""
     if layer == OUTER:
         return [closed_path(cuts.outer, origin)]
-    if layer == INNER:
-        return [closed_path(hole, origin) for hole in cuts.holes]
     pattern = panel.pattern
+    if layer in (INNER, STITCH):
+        roles = map(hole_role, pattern.holes)
+        holes = zip(cuts.holes, roles, strict=True)
+        return [closed_path(hole, origin) for hole, role in holes if role == layer]
     lines = [straight_path(a.start, a.end, origin) for a in pattern.lines if a.layer == layer]
-    edges = zip(pattern.drawings, drawn, strict=True)
-    return [*lines, *(open_path(path, origin) for edge, path in edges if edge.name == layer)]
+    return [*lines, *(open_path(path, origin) for name, path in drawn if name == layer)]
 
 
 def _read(path: FilePath, panel: Panel, exact: bool) -> tuple[Contours, list[Path]]:
@@ -161,11 +177,19 @@ def _read(path: FilePath, panel: Panel, exact: bool) -> tuple[Contours, list[Pat
         }
         origin = svg_origin(panel)
         (outer,) = [read_closed(data, origin, exact=exact) for data in found[OUTER]]
-        holes = [read_closed(data, origin, exact=exact) for data in found.get(INNER, [])]
+        holes = [read_closed(data, origin, exact=exact) for data in _holes(found, panel)]
         drawn = [read_open(data, origin) for data in _drawings(found, panel)]
     except (ElementTree.ParseError, KeyError, ValueError, IndexError) as error:
         raise torn(READBACK, path, f"not readable: {error}", panel=panel.name) from error
     return Contours(outer, tuple(holes)), drawn
+
+
+def _holes(found: dict[str, list[str]], panel: Panel) -> list[str]:
+    """The path data of the holes, in the pattern's order; those that are left come last."""
+    left = {role: list(found.get(role, ())) for role in (STITCH, INNER)}
+    roles = [hole_role(hole) for hole in panel.pattern.holes]
+    inner = [left[role].pop(0) for role in roles if left[role]]
+    return [*inner, *left[STITCH], *left[INNER]]
 
 
 def _drawings(found: dict[str, list[str]], panel: Panel) -> list[str]:
@@ -178,9 +202,10 @@ def _drawings(found: dict[str, list[str]], panel: Panel) -> list[str]:
     left = {
         layer: iter(data[sum(line.layer == layer for line in pattern.lines) :])
         for layer, data in found.items()
-        if layer not in (OUTER, INNER)
+        if layer not in (OUTER, INNER, STITCH)
     }
-    drawn = [next(left.get(edge.name, iter(())), "") for edge in pattern.drawings]
+    layers = [stroke[0].name for stroke in strokes(pattern.drawings)]
+    drawn = [next(left.get(layer, iter(())), "") for layer in layers]
     if not all(drawn) or any(next(rest, "") for rest in left.values()):
         raise ValueError("drawings are missing, or there are too many")
     return drawn

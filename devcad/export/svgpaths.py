@@ -12,6 +12,7 @@ from devcad.flatten.loops import Loop, Path
 from devcad.geometry.taylor import Array
 
 NAMESPACE = "http://www.w3.org/2000/svg"
+STRAIGHT = 2e-10  # mm, twice the rise of an arc that no digit of the file can tell from its chord
 QUARTER = 0.5 * np.pi  # rad; an SVG arc is centred by its radius, ill-conditioned near a half turn
 
 
@@ -34,11 +35,11 @@ def straight_path(start: Array, end: Array, origin: Array) -> str:
 def _run(points: Array, bulges: Array, origin: Array) -> list[str]:
     out = [f"M{_point(points[0], origin)}"]
     for start, end, bulge in zip(points[:-1], points[1:], bulges.tolist(), strict=True):
-        if bulge == 0.0:
+        if abs(bulge) * float(np.hypot(*(end - start))) <= STRAIGHT:
             out.append(f"L{_point(end, origin)}")
             continue
         half = 2.0 * np.arctan(bulge)
-        parts = int(np.ceil(2.0 * abs(half) / QUARTER - 1e-9))
+        parts = max(1, int(np.ceil(2.0 * abs(half) / QUARTER - 1e-9)))
         inner, part_bulge = loops.split(start, bulge, end, parts)
         stops = np.concatenate([start[None], inner, end[None]])
         sine = abs(np.sin(2.0 * np.arctan(part_bulge)))

@@ -10,17 +10,20 @@ import numpy as np
 
 from devcad.errors import CheckFailed
 from devcad.flatten import loops
+from devcad.flatten.arcarea import with_area
 from devcad.flatten.arcsearch import Nodes, fewest_arcs
 from devcad.flatten.edges import closes_smoothly, smooth_edges
-from devcad.flatten.loops import Loop, Path
+from devcad.flatten.green import swept_area
+from devcad.flatten.loops import SHORTEST, Loop, Path
 from devcad.flatten.measure import deviation
-from devcad.flatten.pattern import Edge
+from devcad.flatten.pattern import CUTOUT, Edge
 from devcad.flatten.trace import Trace, evaluate, trace, turns, unit_tangents
 from devcad.geometry.taylor import Array
 
 EXACT = 1e-9  # of a piece's size: design.md section 7, the scale of every "is it zero"
 NOISE = 2e-11  # of the edge's size: the accuracy of a pattern, 1e-9 mm per 100 mm, twice
-SHORTEST = 0.01  # mm; cutters stumble over shorter segments
+FINER = 0.3  # the next tolerance tried where arcs cannot enclose the true area
+ROUNDS = 6  # fits at most, each nearer than the last
 FINEST = 1e-12  # of an edge's size: no fit is asked to be nearer
 PER_ARC = 12.0  # nodes tried for each arc expected: more costs time, saves at most one arc in 20
 
@@ -33,6 +36,11 @@ Keep = tuple[float | None, float | None]
 Fit = Callable[[Trace, float, Keep], Path]
 """traced edge, tolerance, directions to keep -> path."""
 
+FreeFit = Callable[
+    [Trace, int, int, float, "float | None", "float | None"], "tuple[Array, Array] | None"
+]
+"""traced edge, first and last sample, tolerance, directions to keep -> points and bulges."""
+
 Pieces = list[tuple[int, int, "Path | None"]]
 """Stretches of a trace, (first sample, last sample, exact path or None), end to end."""
 
@@ -43,8 +51,9 @@ def fit_outline(outline: tuple[Edge, ...], tolerance: float) -> Loop:
     From corner to corner (``smooth_edges``) straight lines and circular arcs are recognised;
     what is neither becomes the fewest tangent continuous arcs found. Every corner is a vertex;
     edges shorter than 1e-9 of the outline are dropped. No arc sweeps more than half a turn, and
-    none is shorter than 0.01 mm unless its edge is or the tolerance asks for it.
-    ``deviation`` is measured on the true curves.
+    none is shorter than 0.01 mm unless its edge is or the tolerance asks for it. What is cut
+    out (edges named "cutout") encloses the true area, to rounding. ``deviation`` is measured on
+    the true curves.
 
     Raises:
         CheckFailed: the tolerance cannot be kept (it is below the rounding of the numbers).
@@ -96,8 +105,12 @@ def fit_trace(traced: Trace, tolerance: float, keep: Keep) -> Path:
     stretches = pieces(traced)
     aim, found = 0.99 * tolerance, FINEST * traced.size
     exact = all(path is not None for _, _, path in stretches)
-    for _ in range(6 if exact or found < tolerance else 0):
-        path = _join(traced, stretches, aim, keep)
+    for left in reversed(range(ROUNDS if exact or found < tolerance else 0)):
+        fit = _fit_cut if left and traced.edge.name == CUTOUT else _fit_free
+        path = _join(traced, stretches, aim, keep, fit)
+        if path is None:
+            aim *= FINER
+            continue
         found = deviation(traced, path.points, path.bulges)
         if found <= tolerance or path.exact:
             return replace(path, deviation=found)
@@ -110,8 +123,10 @@ def fit_trace(traced: Trace, tolerance: float, keep: Keep) -> Path:
     )
 
 
-def _join(traced: Trace, stretches: Pieces, tolerance: float, keep: Keep) -> Path:
-    """Exact pieces and fitted ones, end to end, tangent continuous."""
+def _join(
+    traced: Trace, stretches: Pieces, tolerance: float, keep: Keep, fit: FreeFit
+) -> Path | None:
+    """Exact pieces and fitted ones, end to end, tangent continuous; None where the fit is."""
     parts: list[Path] = []
     for k, (i, j, exact) in enumerate(stretches):
         if exact is not None:
@@ -119,8 +134,10 @@ def _join(traced: Trace, stretches: Pieces, tolerance: float, keep: Keep) -> Pat
             continue
         start = keep[0] if k == 0 else end_direction(stretches[k - 1][2], last=True)
         end = keep[1] if k == len(stretches) - 1 else end_direction(stretches[k + 1][2], last=False)
-        points, bulges = _fit_free(traced, i, j, tolerance, start, end)
-        parts.append(Path(points, bulges, False, 0.0))
+        found = fit(traced, i, j, tolerance, start, end)
+        if found is None:
+            return None
+        parts.append(Path(*found, False, 0.0))
     inner = [part.points[:-1] for part in parts]
     return Path(
         np.concatenate([*inner, traced.points[-1:]]),
@@ -128,6 +145,28 @@ def _join(traced: Trace, stretches: Pieces, tolerance: float, keep: Keep) -> Pat
         all(part.exact for part in parts),
         0.0,
     )
+
+
+def _fit_cut(
+    traced: Trace, i: int, j: int, tolerance: float, start: float | None, end: float | None
+) -> tuple[Array, Array] | None:
+    """As :func:`_fit_free` with the area of the true curve; None where these arcs have it not."""
+    points, bulges = _fit_free(traced, i, j, tolerance, start, end)
+    kept = (start is not None, end is not None)
+    found = with_area(points, bulges, _swept(traced, i, j), kept)
+    if found is None or _shortest(*found) < min(SHORTEST, _shortest(points, bulges)):
+        return None
+    return found
+
+
+def _shortest(points: Array, bulges: Array) -> float:
+    return float(loops.lengths(points[:-1], points[1:], bulges).min())
+
+
+def _swept(traced: Trace, i: int, j: int) -> float:
+    """The area between the true curve from sample i to sample j and its chord."""
+    inner = traced.knots[(traced.knots > i) & (traced.knots < j)]
+    return swept_area(replace(traced.edge, u=traced.u[[i, *inner, j]]))
 
 
 def end_direction(path: Path | None, *, last: bool) -> float | None:
@@ -231,16 +270,40 @@ def pieces(traced: Trace) -> Pieces:
         exact = _recognise(traced, i, j)
         if exact is not None and traced.s[j] - traced.s[i] < SHORTEST:
             exact = None
-        if found and exact is None and found[-1][2] is None:
-            found[-1] = (found[-1][0], j, None)
-            continue
-        if found and exact is not None and found[-1][2] is not None:
-            both = _recognise(traced, found[-1][0], j)
-            if both is not None:
-                found[-1] = (found[-1][0], j, both)
-                continue
         found.append((i, j, exact))
+    found = _joined(traced, found)
+    return _without_short(traced, found) if traced.edge.name == CUTOUT else found
+
+
+def _without_short(traced: Trace, found: Pieces) -> Pieces:
+    """The pieces with those below 0.01 mm given to a neighbour: a contour that only just reaches
+    over a joint. It becomes longer if it still is the same line or arc, else it is fitted."""
+    while len(found) > 1:
+        sizes = [float(traced.s[j] - traced.s[i]) for i, j, _ in found]
+        k = int(np.argmin(sizes))
+        pairs = [n for n in (k - 1, k) if 0 <= n < len(found) - 1]
+        if sizes[k] >= SHORTEST:
+            break
+        ends = [(found[n][0], found[n + 1][1]) for n in pairs]
+        exact = [_recognise(traced, i, j) for i, j in ends]
+        free = [found[n][2] is None or found[n + 1][2] is None for n in pairs]
+        best = min(range(len(pairs)), key=lambda m: (exact[m] is None, not free[m]))
+        n = pairs[best]
+        found = _joined(traced, [*found[:n], (*ends[best], exact[best]), *found[n + 2 :]])
     return found
+
+
+def _joined(traced: Trace, found: Pieces) -> Pieces:
+    """The pieces with neighbours that are one line, one arc or both free made one."""
+    out: Pieces = []
+    for i, j, exact in found:
+        if out and (out[-1][2] is None) == (exact is None):
+            both = None if exact is None else _recognise(traced, out[-1][0], j)
+            if exact is None or both is not None:
+                out[-1] = (out[-1][0], j, both)
+                continue
+        out.append((i, j, exact))
+    return out
 
 
 def _recognise(traced: Trace, i: int, j: int) -> Path | None:

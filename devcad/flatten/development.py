@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from devcad.flatten.neutral import Fibre
 from devcad.geometry import chebyshev
 from devcad.geometry.chain import Chain
 from devcad.geometry.chebyshev import Piecewise
@@ -77,23 +79,27 @@ class Development:
         return Development(replace(self.series, coefficients=table))
 
 
-def develop(patch: Patch) -> Development:
+def develop(patch: Patch, fibre: Fibre | None = None) -> Development:
     """Unroll a patch isometrically: the plane image of c0(t) and of the ruling e(t).
 
     Integrates omega' = a, X' = p cos(omega) - q sin(omega), Y' = p sin(omega) + q cos(omega)
     between the patch's breaks, to rounding. The bending c does not enter the shape; it is kept
-    beside it. At the start c0 is the origin, e is +x and t grows towards +y.
+    beside it. At the start c0 is the origin, e is +x and t grows towards +y. With a ``fibre`` it
+    is the pattern of that neutral fibre (neutral.py), else of the surface itself.
 
     Not checked here: that the patch is developable and regular (see regularity.py).
     Source: geometry.md, 13; do Carmo, Differential Geometry of Curves and Surfaces, 4-4.
     """
     knots = patch.segments
+    if fibre is not None:
+        knots = np.array([knots[0], *fibre.breaks(patch), knots[-1]])
     span = knots[-1] - knots[0]
 
     def sample(t: Array, _low: float, _high: float) -> Array:
         frame = patch.frame(t)
         reach = np.maximum(np.abs(frame.v_from), np.abs(frame.v_to))
-        return np.column_stack([frame.a, frame.p, frame.q, frame.c, reach * frame.a])
+        q = frame.q if fibre is None else frame.q - fibre.shift(frame)
+        return np.column_stack([frame.a, frame.p, q, frame.c, reach * frame.a])
 
     def lift(raw: Array, half: float) -> Array:
         a, p, q, c, _ = raw.T
@@ -112,14 +118,15 @@ def develop(patch: Patch) -> Development:
     return Development(_assemble(rates))
 
 
-def develop_chain(chain: Chain) -> tuple[Development, ...]:
-    """The developments of a chain's patches, each laid on along the ruling it shares."""
+def develop_chain(chain: Chain, fibres: Sequence[Fibre | None] = ()) -> tuple[Development, ...]:
+    """The developments of a chain's patches, each laid on along the ruling it shares; of their
+    neutral ``fibres``, where a patch has one."""
     out: list[Development] = []
     omega, origin = 0.0, np.zeros(2)
     for k, patch in enumerate(chain.patches):
         if k:
             origin = origin + chain.joints[k - 1].shift * _direction(np.array([omega]))[0]
-        development = develop(patch).placed(omega, origin)
+        development = develop(patch, fibres[k] if fibres else None).placed(omega, origin)
         end = development.series(np.array([patch.domain[1]]))[0]
         omega, origin = float(end[0]), end[1:3]
         out.append(development)

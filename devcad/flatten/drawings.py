@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
-from devcad.flatten.pattern import Edge, Line, Unrolled
-from devcad.geometry.drawing import Drawing
+from devcad.flatten.pattern import Edge, Line, PlaneCurve, Unrolled
+from devcad.geometry.drawing import Drawing, OnSurface
 from devcad.geometry.patch import Patch
 from devcad.geometry.taylor import Array
 
@@ -15,6 +17,8 @@ HALVINGS = 60
 """A step halved so often is below the rounding of the parameter."""
 ON_BORDER = 1e-10
 """Of the extent's width and of the domain: a line as near to the border runs along it."""
+KINK = 1e-6
+"""A line that turns by more than this at one point, in radians, has a corner there."""
 SEEN = (0.29, 0.5, 0.77)
 """Where a stretch between two crossings is looked at, as shares of it."""
 
@@ -22,30 +26,69 @@ SEEN = (0.29, 0.5, 0.77)
 def draw(drawing: Drawing, patch: Patch, unrolled: Unrolled) -> tuple[Edge, ...]:
     """A drawing as curves in the plane, one for each of its stretches on the patch.
 
-    The image of (t, v) is the development's, and so is the derivative: the tangent
-    dt (p e + (q + v a) m) + dv e of the surface, carried over. What leaves the patch's domain or
-    its extent is left out, and what runs along its border: there the cut is. The edges' ``u``
-    also list where the path crosses the patch's breaks.
+    What leaves the patch's domain or its extent is left out, and what runs along its border:
+    there the cut is. The edges' ``u`` also list where the path crosses the patch's breaks.
     """
 
-    def curve(u: Array) -> tuple[Array, Array]:
-        t, v, dt, dv = drawing.path(u)
-        t = np.clip(t, *patch.domain)
-        f = patch.frame(t)
-        origin, e, m = unrolled.axes(t)
-        slope = (dt * f.p + dv)[:, None] * e + (dt * (f.q + v * f.a))[:, None] * m
-        return origin + v[:, None] * e, slope
-
+    curve = image(drawing.path, patch, unrolled)
     knots = _crossings(drawing, patch)
     places = np.concatenate([knots[:-1] + share * np.diff(knots) for share in SEEN])
     sides = _sides(drawing, patch, places)[:, :4].reshape(len(SEEN), -1, 4)
     within = np.any(sides > 2.0 * ON_BORDER, axis=0)  # of each border, somewhere
     kept = np.all(sides >= 0.0, axis=(0, 2)) & np.all(within, axis=1)
     changes = np.flatnonzero(np.diff(kept.astype(int), prepend=0, append=0)).tolist()
-    return tuple(
-        Edge(drawing.layer, curve, knots[i : j + 1])
+    kinks = _kinks(curve, knots)
+    runs = [
+        run
         for i, j in zip(changes[::2], changes[1::2], strict=True)
+        for run in _between(knots, i, j, kinks)
+    ]
+    return tuple(
+        Edge(drawing.layer, kept_inside(curve, run) if kinks else curve, run) for run in runs
     )
+
+
+def kept_inside(curve: PlaneCurve, run: Array) -> PlaneCurve:
+    """The curve, asked just inside the ends of a run: there it answers for this side."""
+    low, high = np.nextafter(run[0], run[-1]), np.nextafter(run[-1], run[0])
+    return lambda u: curve(np.clip(u, low, high))
+
+
+def _kinks(curve: PlaneCurve, knots: Array) -> list[int]:
+    """At which of the inner knots the image turns: a break across which the pattern's speed jumps,
+    where a flat goes over into a bend whose neutral fibre is not the middle."""
+    inner = knots[1:-1]
+    if not inner.size:
+        return []
+    reach = 1e-9 * (knots[-1] - knots[0])
+    before, after = (curve(inner + side * reach)[1] for side in (-1.0, 1.0))
+    sine = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
+    turn = np.abs(np.arctan2(sine, (before * after).sum(axis=1)))
+    return (np.flatnonzero(turn > KINK) + 1).tolist()
+
+
+def _between(knots: Array, first: int, last: int, kinks: list[int]) -> list[Array]:
+    """The knots from the first to the last, in runs that end at kinks."""
+    ends = [first, *(k for k in kinks if first < k < last), last]
+    return [knots[i : j + 1] for i, j in pairwise(ends)]
+
+
+def image(path: OnSurface, patch: Patch, unrolled: Unrolled) -> PlaneCurve:
+    """A path on a patch as a curve in the plane.
+
+    The image of (t, v) is the development's, and so is the derivative: the tangent
+    dt (p e + (q + v a) m) + dv e of the surface, carried over.
+    """
+
+    def curve(u: Array) -> tuple[Array, Array]:
+        t, v, dt, dv = path(u)
+        t = np.clip(t, *patch.domain)
+        f = patch.frame(t)
+        origin, e, m = unrolled.axes(t)
+        slope = (dt * f.p + dv)[:, None] * e + (dt * (f.q + v * f.a))[:, None] * m
+        return origin + v[:, None] * e, slope
+
+    return curve
 
 
 def not_repeated(

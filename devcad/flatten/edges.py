@@ -7,10 +7,13 @@ import itertools
 import numpy as np
 
 from devcad.flatten import loops
-from devcad.flatten.pattern import Edge, sample
+from devcad.flatten.pattern import CUTOUT, Edge, length_bound, sample
+from devcad.flatten.shapes import MARK
 from devcad.flatten.trace import evaluate
 from devcad.geometry.taylor import Array
 
+STROKES = {MARK, "SEW", "GRAIN", "LABEL", "GLUE", "NOTCH_MARK"}
+"""Roles of drawings whose edges are strokes of a pen, one after the other."""
 DROPPED = 1e-9  # of the outline's size: a shorter edge is a corner
 SMOOTH = 1e-6  # rad: a smaller corner between two edges is none
 
@@ -18,21 +21,56 @@ SMOOTH = 1e-6  # rad: a smaller corner between two edges is none
 def smooth_edges(outline: tuple[Edge, ...]) -> tuple[Edge, ...]:
     """The same closed outline with an edge from each true corner to the next.
 
-    Edges shorter than 1e-9 of the outline are left out; edges that continue each other
-    smoothly become one, whose ``u`` lists their joints. An outline without any corner stays
-    one closed edge from the first point. The run begins at the first edge's start unless that
-    lies within a smooth run.
+    Edges shorter than 1e-9 of the outline are left out, and cuts below 0.01 mm in a straight
+    side; edges that continue each other smoothly become one, whose ``u`` lists their joints. An
+    outline without any corner stays one closed edge from the first point. The run begins at the
+    first edge's start unless that lies within a smooth run.
     """
     samples = [sample(edge, 8) for edge in outline]
     size = float(np.hypot(*np.ptp(np.concatenate(samples), axis=0)))
     lengths = [float(np.hypot(*np.diff(points, axis=0).T).sum()) for points in samples]
     kept = [edge for edge, length in zip(outline, lengths, strict=True) if length > DROPPED * size]
+    sides = zip(kept[-1:] + kept[:-1], kept, kept[1:] + kept[:1], strict=True)
+    kept = [edge for before, edge, after in sides if not _nick(before, edge, after)]
     corners = [k for k, edge in enumerate(kept) if not _continues(kept[k - 1], edge)]
     if not corners:
         return (_chained(kept),)
     starts = [*corners, corners[0] + len(kept)]
     around = kept + kept
     return tuple(_chained(around[i:j]) for i, j in itertools.pairwise(starts))
+
+
+def _nick(before: Edge, edge: Edge, after: Edge) -> bool:
+    """Whether an edge is where a hole only just reaches over a straight side: nothing to cut."""
+    if edge.name != CUTOUT or before.name != after.name or before.name == CUTOUT:
+        return False
+    return length_bound(edge) < loops.SHORTEST and _continues(before, after)
+
+
+def strokes(drawings: tuple[Edge, ...]) -> tuple[tuple[Edge, ...], ...]:
+    """The lines of drawings, each drawn without lifting the pen: strokes of one role that follow
+    one another and begin where the one before ends belong together, an edge for each smooth run."""
+    out: list[list[Edge]] = []
+    for edge in drawings:
+        before = out[-1][-1] if out else None
+        goes_on = before is not None and before.name == edge.name and edge.name in STROKES
+        if before is not None and goes_on and _meets(before, edge):
+            out[-1].append(edge)
+        else:
+            out.append([edge])
+    return tuple(_smooth_runs(stroke) for stroke in out)
+
+
+def _smooth_runs(edges: list[Edge]) -> tuple[Edge, ...]:
+    """Edges that follow each other with those that continue each other smoothly made one."""
+    corners = [k for k in range(1, len(edges)) if not _continues(edges[k - 1], edges[k])]
+    return tuple(_chained(edges[i:j]) for i, j in itertools.pairwise([0, *corners, len(edges)]))
+
+
+def _meets(before: Edge, after: Edge) -> bool:
+    """Whether an edge begins where the one before ends."""
+    gap = after.curve(after.u[:1])[0][0] - before.curve(before.u[-1:])[0][0]
+    return float(np.hypot(*gap)) <= DROPPED * (length_bound(before) + length_bound(after))
 
 
 def closes_smoothly(edges: tuple[Edge, ...]) -> bool:
@@ -78,4 +116,5 @@ def _chained(edges: list[Edge]) -> Edge:
         k + (edge.u[:-1] - a) / (b - a)
         for k, (edge, (a, b)) in enumerate(zip(edges, spans, strict=True))
     ]
-    return Edge(edges[0].name, curve, np.concatenate([*inner, [float(len(edges))]]))
+    name = CUTOUT if any(edge.name == CUTOUT for edge in edges) else edges[0].name
+    return Edge(name, curve, np.concatenate([*inner, [float(len(edges))]]))

@@ -40,8 +40,11 @@ class Folded:
 
     def points(self, t: Array, v: Array) -> Array:
         """The points in space of the pattern's points (t, v), each (n,), shape (n, 3)."""
+        return self.carried(t, self.development.points(t, v))
+
+    def carried(self, t: Array, flat: Array) -> Array:
+        """The points in space of points (n, 2) of the plane that lie on the rulings t (n,)."""
         motion = self.motion(t).reshape(-1, 3, 4)
-        flat = self.development.points(t, v)
         return np.asarray(np.einsum("nij,nj->ni", motion[:, :, :2], flat) + motion[:, :, 3])
 
     def frames(self, t: Array) -> tuple[Array, Array, Array, Array]:

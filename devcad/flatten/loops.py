@@ -46,6 +46,8 @@ class Loop:
         return np.roll(self.points, -1, axis=0)
 
 
+SHORTEST = 0.01
+"""mm; cutters stumble over shorter segments."""
 FULL = 2.0 * np.pi - 2e-9
 """Arcs that sweep as much are full circles, radians."""
 SPIKE = 0.3
@@ -88,10 +90,10 @@ def area(loop: Loop) -> float:
     a, b = loop.points - loop.points[0], loop.ends - loop.points[0]
     chord2 = dot(b - a, b - a)
     sweep = 2.0 * half_sweeps(loop.bulges)
-    return float(0.5 * cross(a, b).sum() + (chord2 * _segment_factor(sweep)).sum())
+    return float(0.5 * cross(a, b).sum() + (chord2 * segment_factor(sweep)).sum())
 
 
-def _segment_factor(x: Array) -> Array:
+def segment_factor(x: Array) -> Array:
     """(x - sin x) / (8 sin(x/2)^2): a circular segment's area over its chord squared."""
     small = np.abs(x) < 0.05
     y = np.where(small, 1.0, x)

@@ -16,7 +16,9 @@ from typing import NoReturn
 import numpy as np
 
 from devcad.errors import GeometryError
-from devcad.flatten.outline import border, bounds, integral, reference_lines
+from devcad.flatten.border import border
+from devcad.flatten.green import bounds
+from devcad.flatten.outline import integral, reference_lines
 from devcad.flatten.pattern import Pattern
 from devcad.geometry import chebyshev
 from devcad.geometry.chain import Chain

@@ -6,16 +6,19 @@ point is the origin, the ruling is +x and t grows towards +y. Coordinates are mm
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
+from devcad.geometry.edge import Edge as Edge
+from devcad.geometry.edge import PlaneCurve as PlaneCurve
 from devcad.geometry.taylor import Array
 
-PlaneCurve = Callable[[Array], tuple[Array, Array]]
-"""u (n,) -> points (n, 2) and derivatives d/du (n, 2)."""
+CUTOUT = "cutout"
+"""The name of the edges along which a feature was cut."""
+STITCH = "stitch"
+"""The name of the edges of a hole for a thread."""
 
 
 class Unrolled(Protocol):
@@ -26,20 +29,6 @@ class Unrolled(Protocol):
 
     def points(self, t: Array, v: Array) -> Array:
         """The images of the surface points (t, v), each (n,), shape (n, 2)."""
-
-
-@dataclass(frozen=True, slots=True)
-class Edge:
-    """One smooth line, run from ``u[0]`` to ``u[-1]`` (increasing or decreasing).
-
-    ``curve`` is callable at any u between; ``u`` (k,) lists the ends and, between them, the
-    places where the curve is only tangent continuous. ``name`` is start, end, base or top for a
-    piece of an outline, and the layer, such as ENGRAVE, for a drawing.
-    """
-
-    name: str
-    curve: PlaneCurve
-    u: Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,9 +49,10 @@ class Line:
 class Pattern:
     """``outline`` runs counterclockwise along the edges in order, each end the next start.
 
-    ``lines`` are the reference lines inside it, ``area`` is the exact area in mm2,
-    ``bbox`` = (xmin, ymin, xmax, ymax) the exact bounding box. ``drawings`` are curves on the
-    sheet that no cutter cuts through, open or closed, each on the layer that its name says.
+    ``lines`` are the reference lines inside it, ``area`` is the exact area in mm2 without the
+    holes, ``bbox`` = (xmin, ymin, xmax, ymax) the exact bounding box. ``holes`` are closed
+    contours inside the outline, clockwise. ``drawings`` are curves on the sheet that no cutter
+    cuts through, open or closed, each on the layer that its name says.
     """
 
     outline: tuple[Edge, ...]
@@ -80,3 +70,9 @@ def sample(edge: Edge, per_piece: int) -> Array:
         [*(a + (b - a) * s for a, b in zip(edge.u[:-1], edge.u[1:], strict=True)), edge.u[-1:]]
     )
     return edge.curve(u)[0]
+
+
+def length_bound(edge: Edge) -> float:
+    """The length of a coarse polygon on an edge: zero where the edge is a point."""
+    u = np.linspace(edge.u[0], edge.u[-1], 9)
+    return float(np.linalg.norm(np.diff(edge.curve(u)[0], axis=0), axis=1).sum())

@@ -52,7 +52,7 @@ class Piecewise:
         x = ((t - low) - (high - t)) / (high - low)
         if len(self.coefficients) == 1:
             return _clenshaw_one(self.coefficients[0], x)
-        return _clenshaw(self.coefficients[panel], x)
+        return clenshaw(self.coefficients[panel], x)
 
     def antiderivative(self) -> Piecewise:
         """The integral from the first knot, continuous, one degree higher."""
@@ -67,7 +67,7 @@ class Piecewise:
     def derivative(self) -> Piecewise:
         """The derivative on each panel, one degree lower."""
         half = 0.5 * np.diff(self.knots)[:, None, None]
-        matrix = _differentiation(self.coefficients.shape[1])
+        matrix = differentiation(self.coefficients.shape[1])
         return Piecewise(
             self.knots, np.einsum("ij,pjd->pid", matrix, self.coefficients) / half, self.samples
         )
@@ -227,7 +227,7 @@ def integration(number: int) -> Array:
 
 
 @lru_cache(maxsize=16)
-def _differentiation(number: int) -> Array:
+def differentiation(number: int) -> Array:
     """The matrix from the coefficients of f to those of f', (N, N) with a zero last row."""
     matrix = np.zeros((number, number))
     for k in range(number):
@@ -236,7 +236,7 @@ def _differentiation(number: int) -> Array:
     return matrix
 
 
-def _clenshaw(coefficients: Array, x: Array) -> Array:
+def clenshaw(coefficients: Array, x: Array) -> Array:
     """Sum of c_k T_k(x) for each point's own coefficients (n, N, d) and x (n,)."""
     b1 = np.zeros((len(x), coefficients.shape[2]))
     b2 = b1
@@ -247,7 +247,7 @@ def _clenshaw(coefficients: Array, x: Array) -> Array:
 
 
 def _clenshaw_one(coefficients: Array, x: Array) -> Array:
-    """As ``_clenshaw`` when all points share one panel's coefficients (N, d)."""
+    """As ``clenshaw`` when all points share one panel's coefficients (N, d)."""
     last = np.abs(coefficients).max(axis=1)
     used = int(np.flatnonzero(last)[-1]) + 1 if last.any() else 1
     b1 = np.zeros((len(x), coefficients.shape[1]))

@@ -155,7 +155,7 @@ def fit(
         GeometryError: not reached with 4000 spans, or the curves are not numbers.
     """
     if start is not None:
-        spline = _least_squares(curves, course, start, ends, demand.degree)
+        spline = least_squares(curves, course, start, ends, demand.degree)
         if (given := _certified(spline, curves, course, start, demand)) is not None:
             return given
     first = max(4 // (len(course.s) - 1), 1) + 1
@@ -164,7 +164,7 @@ def fit(
     tries = 0
     worst = np.inf
     for _ in range(_ROUNDS):
-        spline = _least_squares(curves, course, knots, ends, demand.degree)
+        spline = least_squares(curves, course, knots, ends, demand.degree)
         error, twist = _measure(spline, curves, course, knots, demand, _PROBES)
         worst = float(max(error.max() / demand.tolerance, twist.max() / demand.twist))
         if worst <= 1.0:
@@ -283,10 +283,13 @@ def _regraded(knots: Array, breaks: Array, size: Array) -> Array:
     return np.concatenate([*pieces, breaks[-1:]])
 
 
-def _least_squares(
+def least_squares(
     curves: Curves, course: Course, distinct: Array, ends: Ends, degree: int
 ) -> Spline:
-    """The spline on the given distinct knots nearest to the curves at Chebyshev points."""
+    """The spline on the distinct knots (k + 1,) that is nearest to the curves at Chebyshev points.
+
+    The ends are met exactly; breaks of the course become knots of multiplicity degree - 1.
+    """
     knots = _clamped(distinct, course.s, degree)
     count = len(knots) - degree - 1
     poles = np.zeros((count, ends.points[0].size))

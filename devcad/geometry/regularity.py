@@ -182,7 +182,13 @@ def _turnover(patch: Patch) -> float | None:
 
 
 def smallest_radius(patch: Patch) -> Extreme:
-    """The smallest radius of curvature of the middle surface in mm; inf on a plane."""
+    """The smallest radius of curvature of the middle surface in mm; inf on a plane, which is also
+    what turns by less than a billionth: where its rulings meet, rounding alone would bend it."""
+    low, high = patch.domain
+    turn = np.abs(patch.frame(sample_parameters(patch, PER_PANEL)).c).max() * (high - low)
+    if turn <= EXACT:
+        middle = 0.5 * (low + high)
+        return Extreme(float("inf"), middle, float(patch.frame([middle]).v_from[0]))
 
     def tightness(t: Array) -> Array:
         frame = patch.frame(t)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal, get_args, get_origin
 
@@ -15,6 +16,7 @@ NEAR = 0.6  # likeness of two words, 1 for equal ones
 NEAR_SHORT = 0.7  # of words up to SHORT letters; pdf and dxf have 2/3
 SHORT = 4
 MOST = 20  # problems told of one file
+_NUMBERED = re.compile(r" \d+$")
 
 
 class InvalidJob(JobError):
@@ -68,10 +70,12 @@ def _once(items: Sequence[Mapping[str, Any]], model: type[BaseModel]) -> list[Ma
 
 
 def below(place: str, path: str) -> str:
-    """A path inside a place: after " > " where the place is only the file, else after a dot."""
+    """A path inside a place: after " > " where the place is only the file or ends with a number
+    (in which a dot would be a decimal point), else after a dot."""
     if not path:
         return place
-    separator = "" if path.startswith("[") else "." if " > " in place else " > "
+    dotted = " > " in place and not _NUMBERED.search(place)
+    separator = "" if path.startswith("[") else "." if dotted else " > "
     return f"{place}{separator}{path}"
 
 
@@ -249,11 +253,11 @@ def _wrong_key(kind: str, item: Mapping[str, Any], model: type[BaseModel], place
     )
 
 
-def unknown_kind(tag: str, known: Iterable[str], *, place: str) -> JobError:
-    """The error of a kind that this version has not."""
+def unknown_kind(tag: str, known: Iterable[str], *, place: str, noun: str = "kind") -> JobError:
+    """The error of a kind (or shape) that this version has not."""
     names = sorted(known)
     return JobError(
-        f'this version knows no kind "{_clip(tag)}"',
+        f'this version knows no {noun} "{_clip(tag)}"',
         place=place,
         value=_clip(tag),
         limit=", ".join(names),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -13,15 +13,20 @@ import numpy as np
 from pydantic import BaseModel, ValidationError
 
 from devcad.errors import DevcadError, JobError
+from devcad.features import Features, Seam
 from devcad.geometry.constructions import SURFACES
 from devcad.geometry.constructions.base import Surface
 from devcad.geometry.taylor import Array
+from devcad.importers.dxf import MAX_BYTES as MAX_DRAWING_BYTES
 from devcad.importers.files import decode, inside, read_bytes
 from devcad.importers.table import parse_points
 from devcad.importers.toml import parse_toml
+from devcad.job.features import Reading
+from devcad.job.featuretables import DrawingFile
 from devcad.job.invalid import below, problems, raise_all, shown, unknown_kind
 from devcad.job.recipe import RecipeTable
-from devcad.job.tables import JobTable, MetaTable, PlaceTable
+from devcad.job.tables import EdgesTable, JobTable, MetaTable, PanelTable, PlaceTable
+from devcad.shop.settings import ALLOWANCES, EDGES, EdgeFinish, EdgeName
 from devcad.units import MM_PER_UNIT
 
 MAX_JOB_BYTES = 256_000
@@ -48,12 +53,17 @@ class Meta:
 
 @dataclass(frozen=True, slots=True)
 class JobPanel:
-    """A surface of the job, still in the job's units, with its name and its place (4, 4) in mm."""
+    """A surface of the job, still in the job's units, with its name and its place (4, 4) in mm.
+
+    ``edges`` holds the finishes of the edges that the job names.
+    """
 
     name: str
     kind: str
     surface: Surface
     place: Array | None
+    features: Features
+    edges: Mapping[EdgeName, EdgeFinish] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +72,7 @@ class Job:
 
     ``single`` says that it has [surface] and not [[panel]]. ``path`` is as the user gave it.
     ``sha256`` is that of the job file's bytes followed by those of the files it names, in their
-    order. ``pipeline`` None leaves the choice to the caller.
+    order, drawings last and each once. ``pipeline`` None leaves the choice to the caller.
     """
 
     name: str
@@ -79,6 +89,7 @@ class Job:
     recipe: RecipeTable
     single: bool
     panels: tuple[JobPanel, ...]
+    seams: tuple[Seam, ...] = ()
 
 
 def load(path: str | Path) -> Job:
@@ -94,7 +105,7 @@ def load(path: str | Path) -> Job:
 
 
 def read_tree(path: str | Path) -> tuple[dict[str, Any], str]:
-    """The tables of a job file, the points of the files it names in them; and its ``sha256``.
+    """The tables of a job file, what the files that it names say in them; and its ``sha256``.
 
     Raises:
         JobError, LimitError, FileError: as ``load``, where the file is no job file at all.
@@ -103,8 +114,11 @@ def read_tree(path: str | Path) -> tuple[dict[str, Any], str]:
     data = read_bytes(Path(path), limit=MAX_JOB_BYTES, place=place)
     tree = parse_toml(decode(data, place=place), place=place)
     digest = hashlib.sha256(data)
+    drawings: dict[str, bytes] = {}
     for table, where in _file_tables(tree, place):
         digest.update(_inline_points(table, Path(path).parent, where))
+    for table, where in _drawing_tables(tree, place):
+        digest.update(_drawing(table, Path(path).parent, where, drawings))
     _refuse_too_large(tree, place)
     return tree, digest.hexdigest()
 
@@ -141,6 +155,33 @@ def _inline_points(table: dict[str, Any], folder: Path, place: str) -> bytes:
     return data
 
 
+def _drawing_tables(tree: dict[str, Any], place: str) -> Iterator[tuple[dict[str, Any], str]]:
+    """The cutouts that name a drawing, with their places, in the file's order."""
+    panels = tree.get("panel")
+    owners = [(tree, place)]
+    for k, panel in enumerate(panels if isinstance(panels, list) else ()):
+        if isinstance(panel, dict):
+            owners.append((panel, f"{place} > panel {panel.get('name', k)}"))
+    for owner, where in owners:
+        rows = owner.get("cutout")
+        for k, row in enumerate(rows if isinstance(rows, list) else (), start=1):
+            drawn = isinstance(row, dict) and row.get("shape") == "dxf"
+            if drawn and isinstance(row.get("file"), str):
+                yield row, f"{where} > cutout {k}"
+
+
+def _drawing(table: dict[str, Any], folder: Path, place: str, read: dict[str, bytes]) -> bytes:
+    """Put the bytes of a drawing beside its name; returns them where they are not ``read`` yet."""
+    name = table["file"]
+    known = name in read
+    if not known:
+        path = inside(folder, name, place=below(place, "file"))
+        where = f"{below(place, 'file')} > {name}"
+        read[name] = read_bytes(path, limit=MAX_DRAWING_BYTES, place=where)
+    table["file"] = DrawingFile(name, read[name])
+    return b"" if known else read[name]
+
+
 def job_of(tree: dict[str, Any], place: str, sha256: str) -> Job:
     """The Job of a tree that ``read_tree`` gave; all its problems at once."""
     table, found = validated(JobTable, tree, place, {})
@@ -154,6 +195,14 @@ def job_of(tree: dict[str, Any], place: str, sha256: str) -> Job:
     assert table is not None  # raise_all spoke otherwise
     names = [panel.name for panel in table.panel or ()] or [table.name]
     places = [panel.place for panel in table.panel or ()] or [table.place]
+    reading = Reading(scale)
+    features = [
+        reading.features(owner.cutout, owner.mark, owner.trim, where)
+        for owner, where in _owners(table, place)
+    ]
+    finishes = [_finishes(owner.edges, scale) for owner, _ in _owners(table, place)]
+    seams = reading.seams(table.seam, place)
+    raise_all(sorted(reading.found, key=lambda error: -error.code))
     return Job(
         name=table.name,
         path=place,
@@ -169,10 +218,35 @@ def job_of(tree: dict[str, Any], place: str, sha256: str) -> Job:
         recipe=table.recipe,
         single=table.surface is not None,
         panels=tuple(
-            JobPanel(name, kind, surface, _matrix(where, scale, place))
-            for name, (kind, surface), where in zip(names, surfaces, places, strict=True)
+            JobPanel(name, kind, surface, _matrix(where, scale, place), own, edges)
+            for name, (kind, surface), where, own, edges in zip(
+                names, surfaces, places, features, finishes, strict=True
+            )
         ),
+        seams=seams,
     )
+
+
+def _owners(table: JobTable, place: str) -> Iterator[tuple[JobTable | PanelTable, str]]:
+    """The tables that features may stand in, one for each panel, with their places."""
+    if table.panel is None:
+        yield table, place
+    for panel in table.panel or ():
+        yield panel, f"{place} > panel {panel.name}"
+
+
+def _finishes(table: EdgesTable | None, scale: float) -> dict[EdgeName, EdgeFinish]:
+    """The finishes of the edges that a table names, in mm."""
+    given = {name: getattr(table, name) for name in EDGES if table is not None}
+    return {
+        name: EdgeFinish(
+            ALLOWANCES[edge.finish] if edge.allowance is None else edge.allowance * scale,
+            edge.finish,
+            edge.corner,
+        )
+        for name, edge in given.items()
+        if edge is not None
+    }
 
 
 def _tolerance(value: float | None, scale: float, place: str) -> float:

@@ -1,17 +1,18 @@
 """Recipes: how a part is written. Data in ``pipelines/*.toml``, overridden by jobs and by hand.
 
-A recipe's lengths are millimetres. Precedence, key by key: command line, job, recipe, default.
+A recipe's lengths are millimetres. Precedence, key by key: command line, job, recipe, material,
+default; keys of one choice replace each other as a whole.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AfterValidator, Field, ValidationError
 
 from devcad.checks import NAMES
 from devcad.errors import JobError
@@ -19,6 +20,21 @@ from devcad.export import DEFAULT_FORMATS, FORMATS, Options
 from devcad.importers.files import decode, read_bytes
 from devcad.importers.toml import parse_toml
 from devcad.job.invalid import did_you_mean, problems, raise_all
+from devcad.job.shopsettings import settings
+from devcad.job.shoptables import (
+    SHOP,
+    BendsTable,
+    GlbTable,
+    LabelsTable,
+    LimitsTable,
+    NeutralTable,
+    NotchesTable,
+    PdfTable,
+    SheetTable,
+    StitchTable,
+    Table,
+)
+from devcad.shop.settings import Profile, ShopSettings
 
 DEFAULT = "cad"
 MAX_BYTES = 256_000
@@ -46,13 +62,7 @@ def _known(names: list[str], known: Iterable[str], noun: str) -> list[str]:
     return list(dict.fromkeys(names))
 
 
-class _Table(BaseModel):
-    model_config = ConfigDict(
-        extra="forbid", frozen=True, strict=True, allow_inf_nan=False, validate_by_name=False
-    )
-
-
-class StepTable(_Table):
+class StepTable(Table):
     """How STEP files are written; ``tolerance`` in mm."""
 
     tolerance: Annotated[float, Field(gt=0.0)] | None = None
@@ -60,31 +70,44 @@ class StepTable(_Table):
     schema_: Literal["AP214", "AP242"] | None = Field(None, alias="schema")
 
 
-class DxfTable(_Table):
+class DxfTable(Table):
     """How cut patterns are written."""
 
     version: Literal["R12", "R2000", "R2010"] | None = None
-    profile: Literal["generic"] | None = None
+    profile: Profile | None = Field(None, description="whose layer names and colours")
     curves: Literal["arcs", "polyline", "spline"] | None = None
+    bend_ticks: Annotated[float, Field(ge=0.0)] | None = Field(
+        None, description="mm at both ends of a bend line instead of the whole line; 0: whole"
+    )
 
 
-class RecipeTable(_Table):
+class RecipeTable(Table):
     """The keys of a recipe; a key that is absent leaves the next source its say."""
 
     formats: Annotated[list[str], Field(min_length=1), AfterValidator(known_formats)] | None = None
     step: StepTable = StepTable()
     dxf: DxfTable = DxfTable()
+    glb: GlbTable = GlbTable()
+    neutral: NeutralTable | None = None
+    bends: BendsTable | None = None
+    stitch: StitchTable | None = None
+    notches: NotchesTable | None = None
+    sheet: SheetTable | None = None
+    pdf: PdfTable | None = None
+    limits: LimitsTable | None = None
+    labels: LabelsTable | None = None
     allow: Annotated[list[str], AfterValidator(known_checks)] | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class Recipe:
-    """What an export does: the formats in order, the exporters' options in mm, and the checks
-    that may fail."""
+    """What an export does: the formats in order, the exporters' options in mm, the checks that
+    may fail, and what the shop does with the pattern."""
 
     formats: tuple[str, ...]
     options: Options
     allow: frozenset[str]
+    shop: ShopSettings = field(default_factory=ShopSettings)
 
 
 def resolve(
@@ -101,11 +124,14 @@ def resolve(
     Raises:
         JobError: no such recipe, format or check, or a recipe file that is wrong.
     """
-    keys = {**_flat(_read(name or DEFAULT)), **_flat(override)}
+    sources = [_read(name or DEFAULT), override]
+    shop = settings([_told(source, set(SHOP)) for source in sources])
+    keys = {key: value for source in sources for key, value in _flat(source).items()}
     chosen = known_formats(list(formats)) or keys.pop("formats", DEFAULT_FORMATS)
     keys.pop("formats", None)
     allowed = {*known_checks(list(allow)), *keys.pop("allow", ())}
-    return Recipe(tuple(chosen), Options(**keys), frozenset(allowed))
+    options = replace(Options(**keys), pdf=shop.pdf, kerf=shop.sheet.kerf)
+    return Recipe(tuple(chosen), options, frozenset(allowed), shop)
 
 
 def recipe_names() -> dict[str, str]:
@@ -142,9 +168,14 @@ def _folder() -> Path:
     return inside if inside.is_dir() else package.parent / "pipelines"
 
 
+def _told(table: RecipeTable, names: set[str]) -> dict[str, Any]:
+    """The keys that are given, of these tables; a table without any is there and empty."""
+    return table.model_dump(exclude_none=True, by_alias=True, include=names)
+
+
 def _flat(table: RecipeTable) -> dict[str, Any]:
     """The keys that are given, as the exporters' options name them."""
-    keys = table.model_dump(exclude_none=True, by_alias=True)
+    keys = _told(table, {"formats", "step", "dxf", "allow"})
     step, dxf = keys.pop("step"), keys.pop("dxf")
     return {
         **keys,

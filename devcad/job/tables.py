@@ -5,12 +5,13 @@ from __future__ import annotations
 import re
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from devcad.errors import JobError
 from devcad.geometry.curves import Count, Direction, Model, Number, Positive, Vector
 from devcad.job.recipe import RecipeTable
 from devcad.shop.materials import material
+from devcad.shop.settings import ALLOWANCES, Corner, Finish
 
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
 _DEVICES = re.compile(r"(?:con|prn|aux|nul|com[0-9]|lpt[0-9])(?:\..*)?", re.IGNORECASE)
@@ -70,12 +71,66 @@ class PlaceTable(Model):
     x_axis: Direction | None = None
 
 
+def _in_double_brackets(value: Any) -> Any:
+    """An array of tables; a single table is told how to become one."""
+    if isinstance(value, dict):
+        raise JobError(
+            "is one table, must be an array of tables",
+            value="a table",
+            limit="an array of tables",
+            remedy="write its name in double brackets",
+        )
+    return value
+
+
+Tables = Annotated[list[dict[str, Any]], BeforeValidator(_in_double_brackets)] | None
+"""Any number of tables, [[name]]; their own models check them."""
+
+
+class EdgeTable(Model):
+    """What is done with an edge of a panel."""
+
+    allowance: NonNegative | None = Field(
+        None,
+        description="beyond the seam line; default 0 raw, and 10 turned, 7 lap, 8 tab in mm",
+    )
+    finish: Finish = Field(
+        "raw", description="raw: as cut; turned: folded back; lap: under the other; tab: glued"
+    )
+    corner: Corner = Field("mitre", description="with the allowance of the edge beside it")
+
+    @model_validator(mode="after")
+    def _something_to_hold(self) -> EdgeTable:
+        if self.finish != "raw" and self.allowance == 0.0:
+            raise JobError(
+                f"a {self.finish} edge has no allowance",
+                place="allowance",
+                value=0.0,
+                limit="above 0",
+                remedy=f"give a width, or leave the key out: {ALLOWANCES[self.finish]:g} mm",
+            )
+        return self
+
+
+class EdgesTable(Model):
+    """The edges of a panel: start and end are the first and last ruling."""
+
+    start: EdgeTable | None = None
+    end: EdgeTable | None = None
+    base: EdgeTable | None = None
+    top: EdgeTable | None = None
+
+
 class PanelTable(Model):
     """One panel of a part of several."""
 
     name: Name
     surface: dict[str, Any]
     place: PlaceTable | None = None
+    cutout: Tables = None
+    mark: Tables = None
+    trim: Tables = None
+    edges: EdgesTable | None = None
 
 
 class JobTable(Model):
@@ -92,6 +147,11 @@ class JobTable(Model):
     meta: MetaTable = MetaTable()
     recipe: RecipeTable = RecipeTable()
     place: PlaceTable | None = None
+    cutout: Tables = None
+    mark: Tables = None
+    trim: Tables = None
+    edges: EdgesTable | None = None
+    seam: Tables = None
     surface: dict[str, Any] | None = None
     panel: Annotated[list[PanelTable], Field(min_length=1)] | None = None
 
@@ -107,13 +167,17 @@ class JobTable(Model):
                 limit="one of the two",
                 remedy="a part of one panel has [surface], a part of several [[panel]] tables",
             )
-        if self.panel is not None and self.place is not None:
-            raise JobError(
-                "[place] stands beside [[panel]] tables",
-                value="place",
-                limit="[surface] jobs only",
-                remedy="write [panel.place] below the panel it belongs to",
-            )
+        for key in ("place", "edges", "cutout", "mark", "trim"):
+            if self.panel is not None and getattr(self, key) is not None:
+                one = key in ("place", "edges")
+                table = f"[{key}]" if one else f"[[{key}]]"
+                below = f"[panel.{key}]" if one else f"[[panel.{key}]]"
+                raise JobError(
+                    f"{table} stands beside [[panel]] tables",
+                    value=key,
+                    limit="[surface] jobs only",
+                    remedy=f"write {below} below the panel it belongs to",
+                )
         _refuse_twins([panel.name for panel in self.panel or ()])
         return self
 

@@ -12,6 +12,7 @@ from typing import Any
 from devcad import __version__
 from devcad.checks import Check
 from devcad.export import Written
+from devcad.geometry.seams import Meeting
 from devcad.part import Panel, Part
 
 PANEL_FACTS = (
@@ -73,12 +74,13 @@ def make_report(
         "job_sha256": part.job_sha256 or None,
         "units": "mm",
         "panels": [_panel(panel, every) for panel in part.panels],
-        "checks": [_check(check) for check in every],
-        "files": [_file(written) for written in files],
+        "seams": [_seam(meeting) for meeting in part.seams],
+        "checks": [check_entry(check) for check in every],
+        "files": [file_entry(written) for written in files],
         "svg_origin": origin,
     }
-    plain: dict[str, Any] = _plain(report)
-    return plain
+    told: dict[str, Any] = plain(report)
+    return told
 
 
 def to_bytes(report: Any) -> bytes:
@@ -97,7 +99,18 @@ def _panel(panel: Panel, checks: Sequence[Check]) -> dict[str, Any]:
     }
 
 
-def _check(check: Check) -> dict[str, Any]:
+def _seam(meeting: Meeting) -> dict[str, Any]:
+    return {
+        "edges": [".".join(edge) for edge in meeting.edges],
+        "gap": meeting.gap,
+        "matched": meeting.matched,
+        "joined": meeting.joined,
+        "length": list(meeting.length),
+    }
+
+
+def check_entry(check: Check) -> dict[str, Any]:
+    """A check as the report has it."""
     return {
         "name": check.name,
         "panel": check.panel,
@@ -109,7 +122,8 @@ def _check(check: Check) -> dict[str, Any]:
     }
 
 
-def _file(written: Written) -> dict[str, Any]:
+def file_entry(written: Written) -> dict[str, Any]:
+    """A file as the report has it: named relative to its folder, with its hash."""
     data = written.path.read_bytes()
     return {
         "path": written.path.name,
@@ -117,17 +131,18 @@ def _file(written: Written) -> dict[str, Any]:
         "sha256": hashlib.sha256(data).hexdigest(),
         "bytes": len(data),
         "max_deviation": written.max_deviation,
+        **({"note": written.note} if written.note else {}),
     }
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
     """Numbers, texts, lists and tables that JSON has: numpy's own turned, NaN and infinity None."""
     if isinstance(value, dict):
-        return {str(key): _plain(inner) for key, inner in value.items()}
+        return {str(key): plain(inner) for key, inner in value.items()}
     if isinstance(value, list | tuple):
-        return [_plain(inner) for inner in value]
+        return [plain(inner) for inner in value]
     if hasattr(value, "tolist"):
-        return _plain(value.tolist())
+        return plain(value.tolist())
     if isinstance(value, float):
         return float(value) if math.isfinite(value) else None
     return value

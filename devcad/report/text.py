@@ -39,3 +39,12 @@ def check_lines(report: dict[str, Any]) -> Iterator[str]:
 
 def _number(value: float | None) -> str:
     return "-" if value is None else f"{value:.3g}"
+
+
+def nest_lines(told: dict[str, Any], out: str) -> Iterator[str]:
+    """A line a sheet: path, panels on it, the share of it that they take."""
+    paths = [str(Path(out, sheet["file"])) for sheet in told["sheets"]]
+    width = max((len(path) for path in paths), default=0)
+    for path, sheet in zip(paths, told["sheets"], strict=True):
+        yield f"{path:{width}}  {sheet['panels']:4} panels  {100.0 * sheet['utilisation']:5.1f} %"
+    yield str(Path(out, "nest.json"))

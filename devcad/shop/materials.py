@@ -23,9 +23,9 @@ class Material:
     ``youngs_modulus`` and ``yield_strength`` in MPa (the latter is the strength in bending or
     the ultimate one where there is no yield; ``note`` says so), ``poisson`` or None, ``density``
     in g/mm3, ``k_neutral`` the place of the neutral fibre over the thickness, 0 to 0.5,
-    ``bend_ratio`` the smallest inside radius over the thickness. ``names`` are other names of
-    it, ``note`` tells which end of a range was taken. ``verified`` is False where a number has
-    no source: it is then no ground for a claim.
+    ``bend_ratio`` the smallest inside radius over the thickness. ``colour`` is sRGB, 0 to 1.
+    ``names`` are other names of it, ``note`` tells which end of a range was taken. ``verified``
+    is False where a number has no source: it is then no ground for a claim.
     """
 
     id: str
@@ -38,6 +38,7 @@ class Material:
     density: float
     k_neutral: float
     bend_ratio: float
+    colour: tuple[float, float, float]
     source: str
     verified: bool
     note: str
@@ -45,6 +46,11 @@ class Material:
     def smallest_bend(self, thickness: float) -> float:
         """The smallest inside radius in mm of a sheet."""
         return self.bend_ratio * thickness
+
+    @property
+    def doubt(self) -> str:
+        """What a report adds where a number has no source: "" or words that say so."""
+        return "" if self.verified else f"{self.id}: not verified ({self.source}; {self.note})"
 
     def mass(self, area: float, thickness: float) -> float:
         """The mass in g of a sheet of ``area`` mm2 and ``thickness`` mm."""
@@ -71,10 +77,17 @@ def _material(key: str, row: dict[str, Any]) -> Material:
         density=row["density"] * G_PER_MM3,
         k_neutral=row["k"],
         bend_ratio=row["bend_ratio"],
+        colour=_colour(row["colour"]),
         source=row["source"],
         verified=row["verified"],
         note=row["note"],
     )
+
+
+def _colour(text: str) -> tuple[float, float, float]:
+    """A colour such as "#a5703f" as red, green and blue from 0 to 1."""
+    red, green, blue = (byte / 255.0 for byte in bytes.fromhex(text.removeprefix("#")))
+    return red, green, blue
 
 
 def material(name: str) -> Material:

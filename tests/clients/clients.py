@@ -86,12 +86,21 @@ def node(files: Sequence[Path], out: Path) -> Facts:
     return facts
 
 
-def prusa_slicer(file: Path) -> dict[str, str]:
-    """PrusaSlicer's ``key = value`` lines about a mesh file."""
+def librecad(file: Path) -> Path:
+    """The PDF, beside the file, that LibreCAD prints of a DXF at scale 1:1."""
+    printed = run([program("librecad"), "dxf2pdf", "-s", "1", "-c", file])
+    out = file.with_suffix(".pdf")
+    assert out.is_file() and out.stat().st_size, f"LibreCAD printed nothing:\n{printed[-2000:]}"
+    return out
+
+
+def prusa_slicer(file: Path) -> list[dict[str, str]]:
+    """PrusaSlicer's ``key = value`` lines about each object of a mesh file."""
     printed = run([program("prusa-slicer"), "--info", file])
-    facts = dict(re.findall(r"^(\w+) = (.*?)\s*$", printed, re.MULTILINE))
-    assert facts, f"PrusaSlicer said nothing:\n{printed[-2000:]}"
-    return facts
+    pairs = re.compile(r"^(\w+) = (.*?)\s*$", re.MULTILINE)
+    objects = [dict(pairs.findall(text)) for text in printed.split(f"[{file.name}]")[1:]]
+    assert objects and all(objects), f"PrusaSlicer said nothing:\n{printed[-2000:]}"
+    return objects
 
 
 def admesh(file: Path) -> dict[str, float]:

@@ -12,12 +12,17 @@ import pytest
 from exported import Exported, Look
 
 import devcad
+from devcad.export import DEFAULT_FORMATS
+from devcad.job.load import load
+from devcad.pipeline import plan
 
+STEP = ("step", "step-flat", "step-sheet")
 SAMPLES = clients.REPOSITORY / "samples"
 
 PAIR = """
 name = "pair"
 thickness = 1.5
+material = "brass-cuzn37"
 [[panel]]
 name = "lid"
 [panel.surface]
@@ -38,6 +43,11 @@ sweep = 270
 length = 90
 """
 
+AP242 = """
+[recipe.step]
+schema = "AP242"
+"""
+
 
 OPENED = """
 name = "opened-{kind}"
@@ -50,7 +60,8 @@ gap = 0.7
 
 
 def _jobs() -> dict[str, str]:
-    """Every sample, the thick ones as surfaces without thickness too, and a part of two panels."""
+    """Every sample, the thick ones as surfaces without thickness too, and a part of two panels in
+    both of STEP's schemas."""
     jobs = {path.stem: path.read_text() for path in sorted(SAMPLES.glob("*.toml"))}
     sheets = {
         f"{name}-sheet": re.sub(r"^thickness *=.*$", "", text, flags=re.MULTILINE)
@@ -58,7 +69,7 @@ def _jobs() -> dict[str, str]:
         if "\nthickness" in text
     }
     opened = {f"opened-{kind}": OPENED.format(kind=kind) for kind in ("oloid", "sphericon")}
-    return jobs | sheets | opened | {"pair": PAIR}
+    return jobs | sheets | opened | {"pair": PAIR, "pair-ap242": PAIR + AP242}
 
 
 JOBS = _jobs()
@@ -80,13 +91,17 @@ def exports(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Exported | Ex
         job = home / f"{name}.toml"
         job.write_text(text)
         try:
-            part = devcad.build(job)
-            devcad.export(part, home / name)
+            loaded = load(job)
+            part = devcad.build(loaded)
+            formats = [*DEFAULT_FORMATS, "step-flat"]
+            formats += ["step-sheet", "3mf"] if part.thickness else []
+            options = plan(loaded).options
+            devcad.export(part, home / name, formats=formats, options=options)
         except Exception as problem:
             return problem
         folder = home / name / part.name
         report = json.loads((folder / "report.json").read_text())
-        return Exported(folder, report, part.thickness, part.tolerance)
+        return Exported(folder, report, part.thickness, part.tolerance, part.colour)
 
     return {name: export(name, text) for name, text in JOBS.items()}
 
@@ -119,7 +134,7 @@ def in_freecad(
 ) -> Look:
     """FreeCAD's view of a STEP, DXF or SVG file of any job."""
     answer = tmp_path_factory.mktemp("freecad") / "answers"
-    return _looker(clients.freecad(_every(exports, "step", "dxf", "svg"), answer))
+    return _looker(clients.freecad(_every(exports, *STEP, "dxf", "svg"), answer))
 
 
 @pytest.fixture(scope="session")
@@ -128,4 +143,4 @@ def in_node(
 ) -> Look:
     """The view of the JavaScript clients of any file of any job."""
     answer = tmp_path_factory.mktemp("node") / "answer.json"
-    return _looker(clients.node(_every(exports, "step", "dxf", "stl", "glb"), answer))
+    return _looker(clients.node(_every(exports, *STEP, "dxf", "stl", "glb"), answer))

@@ -13,12 +13,13 @@ Look = Callable[[Path], dict[str, Any]]
 
 @dataclass(frozen=True)
 class Exported:
-    """A job's folder under out/, its report, and what it was built with (mm)."""
+    """A job's folder under out/, its report, and what it was built with (mm, sRGB)."""
 
     folder: Path
     report: dict[str, Any]
     thickness: float
     tolerance: float
+    colour: tuple[float, float, float]
 
     @property
     def name(self) -> str:
@@ -31,6 +32,11 @@ class Exported:
     @property
     def solid(self) -> bool:
         return self.thickness > 0.0
+
+    @property
+    def step_formats(self) -> list[str]:
+        """The STEP files that differ: a sheet without thickness is its own mid-surface."""
+        return ["step", "step-flat", "step-sheet"] if self.solid else ["step", "step-flat"]
 
     def total(self, key: str) -> float:
         """The sum over the panels of an entry of the report."""

@@ -24,16 +24,19 @@ async function step(file) {
     names: [...names, ...read.meshes.map((mesh) => mesh.name)],
     triangles: read.meshes.reduce((sum, mesh) => sum + mesh.index.array.length / 3, 0),
     faces: read.meshes.reduce((sum, mesh) => sum + mesh.brep_faces.length, 0),
+    colours: read.meshes.map((mesh) => mesh.color),
   };
 }
 
 function dxf(file) {
   const module = home('dxf-parser');
   const drawing = new (module.default || module)().parseSync(fs.readFileSync(file, 'utf8'));
+  const header = drawing.header || {}; // the minimal form of sewn-product files has an empty one
+  const blocks = Object.values(drawing.blocks || {}).flatMap((block) => block.entities || []);
   return {
-    version: drawing.header.$ACADVER,
-    units: drawing.header.$INSUNITS,
-    entities: drawing.entities.map((entity) => ({
+    version: header.$ACADVER,
+    units: header.$INSUNITS,
+    entities: [...drawing.entities, ...blocks].map((entity) => ({
       type: entity.type,
       layer: entity.layer,
       closed: entity.shape === true,

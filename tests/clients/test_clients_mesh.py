@@ -21,7 +21,7 @@ def test_prusaslicer_calls_solids_manifold(exported: Exported) -> None:
     mesh = _load(path)
     if len(mesh.faces) < FEWEST:
         return
-    seen = clients.prusa_slicer(path)
+    (seen,) = clients.prusa_slicer(path)
     assert int(seen["number_of_facets"]) == len(mesh.faces)
     if exported.solid:  # an open sheet it turns to the side where its volume is positive
         assert seen["manifold"] == "yes"
@@ -89,7 +89,7 @@ def test_the_clients_notice_a_missing_triangle(tmp_path: Path) -> None:
     box.update_faces(np.arange(len(box.faces)) > 0)
     path = tmp_path / "open.stl"
     box.export(path)
-    assert clients.prusa_slicer(path)["manifold"] == "no"
+    assert clients.prusa_slicer(path)[0]["manifold"] == "no"
     assert clients.admesh(path)["Total disconnected facets"] > 0
     assert not _load(path).is_volume
 

@@ -135,3 +135,50 @@ def off_ellipse(points: Array, a: float, b: float) -> Array:
         level = (b * b - a * a) * s * c + a * x * s - b * y * c
         u = u - level / ((b * b - a * a) * (c * c - s * s) + a * x * c + b * y * s)
     return np.asarray(np.hypot(x - a * np.cos(u), y - b * np.sin(u)))
+
+
+ROLES = ("ENGRAVE", "MARK", "SCORE", "SEW", "GRAIN", "LABEL", "GLUE", "NOTCH_MARK")
+WORKPIECE_AREA = 200.0 * 100.0 + 0.5 * np.pi * 50.0 * 20.0 - np.pi * 64.0 - 4.0 * np.pi * 0.25
+
+
+def workpiece(name: str = "body", curved: bool = True) -> Panel:
+    """A plate 200 x 100 whose upper side is half an ellipse (or straight), with a round hole of
+    diameter 16, four stitch holes of diameter 1, a bend each way, a ruling, and every kind of
+    drawing: a straight line each, of the sew line two, of a label an L, an arc to score."""
+    upper = (
+        bow("top", (150.0, 100.0), (50.0, 20.0), 0.0, np.pi)
+        if curved
+        else straight("top", (200.0, 100.0), (100.0, 100.0))
+    )
+    outline = (
+        straight("start", (0.0, 0.0), (200.0, 0.0)),
+        straight("base", (200.0, 0.0), (200.0, 100.0)),
+        upper,
+        straight("top", (100.0, 100.0), (0.0, 100.0)),
+        straight("end", (0.0, 100.0), (0.0, 0.0)),
+    )
+    holes = (
+        (bow("cutout", (150.0, 50.0), (8.0, 8.0), TURN, 0.0),),
+        *((bow("stitch", (20.0 + 10.0 * k, 5.0), (0.5, 0.5), TURN, 0.0),) for k in range(4)),
+    )
+    lines = (
+        Line("RULING", np.array([40.0, 10.0]), np.array([40.0, 90.0])),
+        Line("BEND_UP", np.array([60.0, 0.0]), np.array([60.0, 100.0]), np.radians(30.0)),
+        Line("BEND_DOWN", np.array([80.0, 0.0]), np.array([80.0, 100.0]), -np.radians(45.0)),
+    )
+    drawings = (
+        straight("ENGRAVE", (10.0, 20.0), (30.0, 20.0)),
+        straight("MARK", (10.0, 25.0), (30.0, 25.0)),
+        bow("SCORE", (100.0, 50.0), (10.0, 10.0), 0.0, 1.5),
+        straight("SEW", (2.0, 8.0), (2.0, 92.0)),
+        straight("SEW", (2.0, 92.0), (60.0, 92.0)),
+        straight("GRAIN", (110.0, 10.0), (110.0, 60.0)),
+        straight("GRAIN", (110.0, 60.0), (107.0, 54.0)),
+        straight("LABEL", (10.0, 40.0), (10.0, 35.0)),
+        straight("LABEL", (10.0, 35.0), (13.0, 35.0)),
+        straight("GLUE", (120.0, 80.0), (140.0, 80.0)),
+        straight("NOTCH_MARK", (5.0, 50.0), (0.0, 50.0)),
+    )
+    area = WORKPIECE_AREA - (0.0 if curved else 0.5 * np.pi * 50.0 * 20.0)
+    made = panel(outline, area, lines, holes, name)
+    return replace(made, pattern=replace(made.pattern, drawings=drawings))

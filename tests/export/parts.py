@@ -12,7 +12,7 @@ import numpy as np
 
 from devcad.flatten.pattern import Pattern
 from devcad.geometry import taylor
-from devcad.geometry.chain import Chain, Joint
+from devcad.geometry.chain import Chain, Joint, link
 from devcad.geometry.classify import Shape
 from devcad.geometry.patch import Patch, RulingJet
 from devcad.geometry.taylor import Array
@@ -378,3 +378,17 @@ def scaled(made: Panel, factor: float) -> Panel:
     return replace(
         made, chain=chain, shapes=shapes, thickness=made.thickness * factor, pattern=pattern
     )
+
+
+def chained(
+    quads: list[tuple[Patch, Shape, float]], *, closed: bool, thickness: float = 0.0
+) -> Panel:
+    """Plane patches one after the other, the creases between them measured."""
+    patches = tuple(patch for patch, _, _ in quads)
+    made = panel(
+        *patches,
+        shapes=tuple(shape for _, shape, _ in quads),
+        area=sum(area for _, _, area in quads),
+        thickness=thickness,
+    )
+    return replace(made, chain=link(patches, base_closed=closed, tolerance=0.05))

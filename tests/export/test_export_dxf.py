@@ -124,7 +124,8 @@ def test_a_pattern_of_lines_and_arcs_is_exact(tmp_path):
     )
     (written,) = exporter.write(job(plain), tmp_path, Options())
     assert written.max_deviation == 0.0
-    assert [(c.name, c.value, c.passed) for c in written.checks] == [("dxf-deviation", 0.0, True)]
+    checks = [(c.name, c.value, c.passed) for c in written.checks]
+    assert checks == [("dxf-deviation", 0.0, True), ("dxf-profile", 0.0, True)]
 
 
 @pytest.mark.parametrize("curves", ["arcs", "polyline"])
@@ -232,7 +233,10 @@ def test_the_librarys_switches_are_put_back(tmp_path):
     ("options", "message"),
     [
         (Options(dxf_version="R14"), "dxf.version is 'R14' (use one of R12, R2000, R2010)"),
-        (Options(dxf_profile="astm"), "dxf.profile is 'astm' (use one of generic)"),
+        (
+            Options(dxf_profile="gerber"),
+            "dxf.profile is 'gerber' (use one of generic, inventor, sendcutsend, lightburn, astm)",
+        ),
         (Options(dxf_curves="nurbs"), "dxf.curves is 'nurbs' (use one of arcs, polyline, spline)"),
         (
             Options(dxf_version="R12", dxf_curves="spline"),

@@ -131,7 +131,10 @@ def test_panels_share_one_scale_and_stay_inside_the_texture(tmp_path):
     assert np.ptp(first, axis=0) == pytest.approx(2 * np.ptp(second, axis=0), abs=2e-7)
     for place in (first, second):
         assert place.min() >= 0.0 and place.max() <= 1.0
-        assert place[:, 0].min() == 0.0 and place[:, 1].max() == 1.0  # the corner xmin, ymin
+    scale = document["extras"]["mm_per_uv"]
+    for node, place in zip(document["nodes"], (first, second), strict=True):
+        corner = np.array([place[:, 0].min(), 1.0 - place[:, 1].max()])
+        assert corner * scale == pytest.approx(node["extras"]["uv_offset_mm"], abs=2e-5)
 
 
 def test_extras_tell_scale_thickness_area_and_part_number(tmp_path):

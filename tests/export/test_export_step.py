@@ -389,7 +389,8 @@ def test_a_moebius_band_is_a_valid_sheet_and_a_twisted_one_fails_its_check(tmp_p
     shape = read(made.path)
     assert BRepCheck_Analyzer(shape, True).IsValid()
     assert kinds(shape) == {"BSplineSurface": 1}
-    assert {c.name: c.passed for c in made.checks} == {"step-deviation": True, "step-twist": False}
+    passed = {c.name: c.passed for c in made.checks}
+    assert passed["step-deviation"] and not passed["step-twist"]
 
 
 def test_planes_with_sharp_creases_meet_in_mitres(tmp_path: Path) -> None:

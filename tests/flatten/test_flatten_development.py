@@ -5,9 +5,11 @@ import pytest
 from patches import ellipse_cylinder, frustum, helix_tangent, prism, slanted_pipe
 
 from devcad.flatten.bend import bent
+from devcad.flatten.blank import lay_flat
 from devcad.flatten.development import develop, develop_chain
 from devcad.flatten.fold import fold, fold_chain
-from devcad.flatten.outline import enclosed_area, lay_out, perimeter, surface_area
+from devcad.flatten.green import enclosed_area, perimeter
+from devcad.flatten.outline import lay_out, surface_area
 from devcad.flatten.verify import fold_back, isometry, overlap_area
 from devcad.geometry import taylor
 from devcad.geometry.chain import Chain, link
@@ -111,7 +113,7 @@ def test_fold_back_sees_bending_of_the_wrong_sign():
 def test_bending_a_helix_surface_half_gives_the_helix_of_half_the_torsion():
     patch = helix_tangent()
     chain = Chain((patch,))
-    (half,) = bent(chain, develop_chain(chain), 0.5).patches
+    (half,) = bent(lay_flat(chain), 0.5).patches
     t = np.linspace(0.5, 9.5, 7)
     f = half.frame(t)
     np.testing.assert_allclose(f.a, 0.12, rtol=1e-11)  # O54: curvature stays
@@ -129,11 +131,10 @@ def test_bending_a_helix_surface_half_gives_the_helix_of_half_the_torsion():
 def test_no_bending_leaves_a_plane_and_full_bending_the_part():
     patch = helix_tangent()
     chain = Chain((patch,))
-    developments = develop_chain(chain)
-    (flat,) = bent(chain, developments, 0.0).patches
+    (flat,) = bent(lay_flat(chain), 0.0).patches
     t = np.linspace(0.5, 9.5, 5)
     np.testing.assert_allclose(flat.frame(t).n, np.tile(flat.frame(t).n[0], (5, 1)), atol=1e-13)
-    (whole,) = bent(chain, developments, 1.0).patches
+    (whole,) = bent(lay_flat(chain), 1.0).patches
     v = np.full(5, 2.0)
     np.testing.assert_allclose(whole.point(t, v), patch.point(t, v), atol=1e-12)
     order = 2

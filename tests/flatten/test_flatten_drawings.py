@@ -8,7 +8,8 @@ from patches import ellipse_cylinder, frustum, helix_tangent, slanted_pipe
 
 from devcad.flatten.development import develop, develop_chain
 from devcad.flatten.drawings import draw
-from devcad.flatten.outline import lay_out, perimeter
+from devcad.flatten.green import perimeter
+from devcad.flatten.outline import lay_out
 from devcad.geometry.chain import Chain
 from devcad.geometry.drawing import Drawing
 from devcad.geometry.patch import Patch

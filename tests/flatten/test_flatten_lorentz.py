@@ -9,6 +9,7 @@ import pytest
 from patches import frustum, helix_tangent, wall
 
 from devcad.errors import GeometryError
+from devcad.flatten.green import enclosed_area
 from devcad.flatten.lorentz import (
     Spacetime,
     lorentz_area,
@@ -16,7 +17,6 @@ from devcad.flatten.lorentz import (
     unroll,
     unroll_chain,
 )
-from devcad.flatten.outline import enclosed_area
 from devcad.geometry import taylor
 from devcad.geometry.chain import Chain, link
 from devcad.geometry.constructions.line_of_curvature import LineOfCurvature

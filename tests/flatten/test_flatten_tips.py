@@ -19,9 +19,11 @@ from scipy.special import ellipe
 from devcad.flatten import loops
 from devcad.flatten.arcs import fit_outline
 from devcad.flatten.bend import bent
+from devcad.flatten.blank import lay_flat
 from devcad.flatten.development import develop, develop_chain
 from devcad.flatten.edges import closes_smoothly, smooth_edges
-from devcad.flatten.outline import enclosed_area, lay_out, perimeter, surface_area
+from devcad.flatten.green import enclosed_area, perimeter
+from devcad.flatten.outline import lay_out, surface_area
 from devcad.flatten.polylines import polyline_outline
 from devcad.flatten.verify import fold_back, isometry, overlap_area
 from devcad.geometry.chain import Chain, cut_at, link
@@ -96,7 +98,7 @@ def test_patches_with_round_tips_unroll_and_fold_back(name):
     assert isometry(patch, developments[0]).value <= 1e-11  # differences of order 8
     worst, size = fold_back(chain, developments)
     assert worst.value <= 1e-13 * size
-    half = bent(chain, developments, 0.5)
+    half = bent(lay_flat(chain), 0.5)
     assert surface_area(half.patches[0]) == pytest.approx(surface_area(patch), rel=1e-12)
     assert overlap_area(pattern_of(patch)) == 0.0
 

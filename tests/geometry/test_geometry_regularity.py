@@ -84,6 +84,28 @@ def test_smallest_radius_of_a_frustum_lies_at_its_narrow_end():
     assert smallest_radius(ellipse_cylinder()).value == pytest.approx(4 / 3, rel=1e-9)
 
 
+def test_a_flat_triangle_has_no_radius_even_at_the_corner_where_its_rulings_meet():
+    """Between (0, 100, 0), (-125, 100, 0) and the corner (0, 80, 220): a plane, whatever rounding
+    makes of c there."""
+    apex = np.array([0.0, 80.0, 220.0])
+    start, along = np.array([0.0, 100.0, 0.0]), np.array([-125.0, 0.0, 0.0])
+
+    def field(t, order):
+        side = np.zeros((order + 1, t.size, 3))
+        side[0] = start + t[:, None] * along - apex
+        if order:
+            side[1] = along
+        length = taylor.norm(side)
+        return RulingJet(
+            taylor.constant_vector(apex, order, t.size),
+            taylor.unit(side),
+            taylor.constant(0.0, order, t.size),
+            length,
+        )
+
+    assert smallest_radius(Patch(field, (0.0, 1.0))).value == np.inf
+
+
 def test_types_and_numbers_of_the_classical_surfaces():
     cone = classify(frustum())
     assert (cone.type, cone.analytic) == ("cone", True)

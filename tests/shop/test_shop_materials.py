@@ -78,6 +78,21 @@ def test_case_does_not_matter_and_a_material_cannot_be_changed():
         load()["dc01"] = material("304")
 
 
+def test_colours_tell_metals_from_what_grew():
+    """sRGB: steel and aluminium are grey, brass is yellow, copper red, leather and wood brown."""
+    colours = {key: material(key).colour for key in IDS}
+    assert all(0.0 <= c <= 1.0 for colour in colours.values() for c in colour)
+    assert len(set(colours.values())) == len(IDS)
+    for key, (red, green, blue) in colours.items():
+        if key in ("brass-cuzn37", "copper-c110", *IDS[7:]):
+            assert red > green > blue
+        else:
+            assert max(red, green, blue) - min(red, green, blue) < 0.05
+    brass, copper = colours["brass-cuzn37"], colours["copper-c110"]
+    assert brass[1] / brass[0] > 0.8 > copper[1] / copper[0]
+    assert colours["veg-tan-leather"] == (0xA5 / 255, 0x70 / 255, 0x3F / 255)
+
+
 def test_unknown_material_is_told_what_exists():
     with pytest.raises(JobError, match='no material "unobtainium"') as failure:
         material("unobtainium")
