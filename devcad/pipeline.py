@@ -10,7 +10,7 @@ from typing import Any
 
 from devcad.assemble import PanelSpec, assemble
 from devcad.checks import FOLLOWS, Check, at_most, require
-from devcad.errors import DevcadError, FileError
+from devcad.errors import DevcadError, FileError, JobError
 from devcad.export import DEFAULT_FORMATS, LAST, Options, Written, writer
 from devcad.export.folder import REPORT, published, unwritable
 from devcad.job.load import Job, JobPanel, load
@@ -57,6 +57,26 @@ def plan(
         raise error.at(place="" if pipeline else f"{job.path} > pipeline") from None
 
 
+def _refuse_later_work(job: Job, recipe: Recipe) -> None:
+    """JobError where a job asks for work on the pattern that nothing does yet: a key that is
+    read and not obeyed would spoil material."""
+    shop = recipe.shop
+    asked = {
+        "recipe.bends": shop.bends.mode == "press-brake",
+        "recipe.stitch": shop.stitch is not None,
+        "recipe.notches": shop.notches is not None,
+        "recipe.labels": shop.labels is not None,
+        "edges": any(panel.edges for panel in job.panels),
+    }
+    for key in (key for key, there in asked.items() if there):
+        raise JobError(
+            "this version reads these keys and does not do the work",
+            place=f"{job.path} > {key}",
+            value=key,
+            remedy="leave them out",
+        )
+
+
 def build(
     job: Job | str | Path,
     *,
@@ -74,6 +94,7 @@ def build(
     """
     job = job if isinstance(job, Job) else load(job)
     recipe = plan(job, pipeline=pipeline, allow=allow)
+    _refuse_later_work(job, recipe)
     sheet = material(job.material) if job.material else None
     progress(f"{job.name}: geometry")
     try:

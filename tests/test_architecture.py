@@ -57,7 +57,16 @@ LIBRARIES: dict[str, list[str]] = {
 }
 """Library -> the beginnings of the paths under devcad/ that may import it."""
 
-LAZY = {"scipy", "shapely", "manifold3d", "trimesh", "build123d", "HersheyFonts", "xatlas", "spyrrow"}
+LAZY = {
+    "scipy",
+    "shapely",
+    "manifold3d",
+    "trimesh",
+    "build123d",
+    "HersheyFonts",
+    "xatlas",
+    "spyrrow",
+}
 """Libraries imported inside functions only: most jobs do without them."""
 
 MOST_LINES = 400  # style: a module of 300 asks whether it holds two ideas

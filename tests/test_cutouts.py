@@ -3,6 +3,7 @@
 import math
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import devcad
@@ -73,3 +74,22 @@ def test_the_flat_blank_of_a_hole_that_touches_the_cut_is_a_solid(tmp_path, y):
     part = built(tmp_path, "thickness = 2\n" + TUBE + CIRCLE.format(y))
     report = devcad.export(part, tmp_path / "out", formats=["step-flat", "step"])
     assert all(check["passed"] for check in report["checks"])
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.3, 0.5 * math.pi, math.pi])
+def test_a_drill_through_the_cut_of_a_tube_takes_what_it_takes_elsewhere(tmp_path, turn):
+    axis = [[0, 0, 60], [math.cos(turn), math.sin(turn), 0]]
+    drill = f'[[cutout]]\nshape = "drill"\naxis = {axis}\ndiameter = 10\n'
+    pattern = built(tmp_path, TUBE + drill).panels[0].pattern
+    # 4 R times the integral of asin(r cos(a) / R) r cos(a) da over a quarter
+    steps = (math.pi / 2) * (2 * np.arange(2000) + 1) / 4000
+    hole = (math.pi / 4000) * np.sum(4 * 50 * np.arcsin(np.cos(steps) / 10) * 5 * np.cos(steps))
+    assert pattern.area == pytest.approx(120.0 * 100.0 * math.pi - hole, abs=1e-7 * hole)
+
+
+@pytest.mark.parametrize(
+    "surface", [TUBE, TUBE.replace('"cylinder"', '"oloid"').split("length")[0]]
+)
+def test_a_feature_far_from_the_sheet_is_told_so(tmp_path, surface):
+    with pytest.raises(GeometryError, match="leaves the sheet"):
+        built(tmp_path, surface + '[[cutout]]\nshape = "circle"\ndiameter = 5\nat = [1000, 50]\n')

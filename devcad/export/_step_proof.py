@@ -190,6 +190,8 @@ def _edges(body: Body, shape: TopoDS_Shape) -> float:
     found = [
         _curve_values(c, np.array([0.5 * (c.FirstParameter() + c.LastParameter())])) for c in curves
     ]
+    if not found:
+        raise _wrong("edges that were written do not read back", body.name)
     wanted = [c(np.array([0.5 * (c.knots[0] + c.knots[-1])])) for c, _ in planned]
     nearest = _nearest(np.concatenate(found), np.concatenate(wanted))
     worst = 0.0

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from devcad.flatten import loops
 from devcad.flatten.loops import Loop, Path
@@ -154,7 +155,7 @@ def _chains(
     return chains, [(float(x), float(y)) for x, y in loose]
 
 
-def _clusters(points: Array, near: float) -> Array:
+def _clusters(points: Array, near: float) -> NDArray[np.intp]:
     """The same number for points that are within ``near`` of each other, (n,)."""
     cells: dict[tuple[int, int], list[int]] = {}
     number = np.arange(len(points))

@@ -199,7 +199,7 @@ def _cells(low: float, high: float, size: float, overlap: float, count: int) -> 
     first, then grids shifted by shares of what it has to spare."""
     step = size - overlap
     spare = max(0.0, count * step + overlap - (high - low + 2.0 * PAD))
-    return [low - PAD - share * spare + step * np.arange(count) for share in SHIFTS]
+    return [np.asarray(low - PAD - share * spare + step * np.arange(count)) for share in SHIFTS]
 
 
 def _occupied(

@@ -138,7 +138,9 @@ def profile(name: str) -> Profile:
 
 def _profile(name: str, table: dict[str, Any]) -> Profile:
     roles = {role: Role(**row) for role, row in table.pop("roles").items()}
-    values = {k: tuple(v) if isinstance(v, list) else v for k, v in table.items()}
+    values: dict[str, Any] = {
+        key: tuple(value) if isinstance(value, list) else value for key, value in table.items()
+    }
     return Profile(name, roles=MappingProxyType(roles), **values)
 
 

@@ -39,6 +39,11 @@ class Hits:
     normal: Array
 
 
+UNEVEN = 0.6180339887
+"""Radians: the rim is not followed from a direction in which parts are drawn, where the places
+looked at would lie on seams and joints to the last digit."""
+
+
 @dataclass(frozen=True, slots=True)
 class Bore:
     """A drill's cylinder: ``point`` on its axis, unit ``axis`` and two directions across it."""
@@ -128,7 +133,9 @@ def walls(drill: Drill, room: Space) -> list[Wall]:
     first = np.eye(3)[int(np.argmin(np.abs(axis)))]
     first = first - (first @ axis) * axis
     first /= np.linalg.norm(first)
-    across = np.stack([first, np.cross(axis, first)])
+    second = np.cross(axis, first)
+    cos, sin = np.cos(UNEVEN), np.sin(UNEVEN)
+    across = np.stack([cos * first + sin * second, cos * second - sin * first])
     bore = Bore(np.asarray(drill.point, dtype=float), axis, across, 0.5 * drill.diameter)
     found = room.hits(bore.point[None], axis)
     on = _within(found, room)

@@ -180,6 +180,8 @@ def _runs(
 ) -> tuple[Stretches, list[list[tuple[Track, ...]]], Flags]:
     """The stretches and the runs of tracks of all contours, and which lie wholly on the sheet."""
     turns = 1
+    if not sheet.copies(*boxes(lines), turns):  # far from every copy of the sheet
+        raise _leaves(0, lines, sheet, f"{error}: {names[0]}", "move it")
     stretches = _in_cells(lines, sheet, sheet.copies(*boxes(lines), turns), notch)
     while sheet.shift is not None and turns < COPIES and _reach(stretches, sheet, turns):
         turns = min(4 * turns, COPIES)  # a contour that winds round the tube

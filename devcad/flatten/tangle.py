@@ -72,8 +72,8 @@ def shared_runs(segments: Segments, near: float, shortest: float) -> list[Shared
         whole = one != other and len(places) == count[one] and all(map(np.all, places.values()))
         key = min(one, other), max(one, other)
         if key not in found or (whole and not found[key].whole):
-            segment, on_it = next(iter(places.items()))
-            x, y = points[segment, on_it].mean(axis=0).tolist()
+            segment, lying = next(iter(places.items()))
+            x, y = points[segment, lying].mean(axis=0).tolist()
             found[key] = Shared(*key, (x, y), bool(whole))
     return [found[key] for key in sorted(found)]
 
@@ -194,12 +194,23 @@ def _tangled(
 
 
 def depths(polygons: Sequence[Array]) -> list[int]:
-    """In how many of the others each polygon lies, where none cross."""
+    """In how many of the others each polygon lies, where none cross; they may touch."""
     low = np.array([p.min(axis=0) for p in polygons]).reshape(-1, 2)
     high = np.array([p.max(axis=0) for p in polygons]).reshape(-1, 2)
     found = []
     for k, polygon in enumerate(polygons):
-        near = np.all((low <= low[k]) & (high[k] <= high), axis=1)
+        place = _inside(polygon)
+        near = np.all((low <= place) & (place <= high), axis=1)
         around = [j for j in np.flatnonzero(near).tolist() if j != k]
-        found.append(sum(winding(polygons[j], polygon[0]) != 0 for j in around))
+        found.append(sum(winding(polygons[j], place) != 0 for j in around))
     return found
+
+
+def _inside(polygon: Array) -> Array:
+    """A point just inside a polygon, beside the middle of its longest side, (2,)."""
+    sides = np.roll(polygon, -1, axis=0) - polygon
+    k = int(np.argmax(np.linalg.norm(sides, axis=1)))
+    moment = polygon - polygon[0]
+    area = np.sum(moment[:, 0] * sides[:, 1] - moment[:, 1] * sides[:, 0])
+    inward = np.sign(area) * np.array([-sides[k, 1], sides[k, 0]])
+    return np.asarray(polygon[k] + 0.5 * sides[k] + 1e-3 * inward)

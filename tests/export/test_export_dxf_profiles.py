@@ -15,14 +15,25 @@ from typing import Any
 import ezdxf
 import numpy as np
 import pytest
-from drawings import ROLES, WORKPIECE_AREA, job, lampshade, lens, straight, workpiece
+from drawings import (
+    ROLES,
+    WORKPIECE_AREA,
+    edge,
+    job,
+    lampshade,
+    lens,
+    panel,
+    straight,
+    workpiece,
+)
 
 from devcad.errors import JobError
 from devcad.export import Options, dxf, svg
 from devcad.export.dxfcheck import check_profile
 from devcad.export.profile import CURVES, PROFILES, VERSIONS, profile
 from devcad.export.profile import ROLES as EVERY_ROLE
-from devcad.flatten.pattern import Line
+from devcad.flatten.pattern import Edge, Line
+from devcad.part import Panel
 
 LAYERS = {
     "generic": {
@@ -59,8 +70,8 @@ MADE = [
 ]
 
 
-def written(folder: Path, name: str, panel: Any = None, **options: Any) -> Any:
-    part = job(workpiece() if panel is None else panel, name="bag")
+def written(folder: Path, name: str, flat: Any = None, **options: Any) -> Any:
+    part = job(workpiece() if flat is None else flat, name="bag")
     (done,) = dxf.write(part, folder, Options(dxf_profile=name, **options))
     return done
 
@@ -611,6 +622,34 @@ def test_a_fault_fails_the_check_with_its_words(tmp_path):
 def test_tiny_and_huge_parts_are_accepted(tmp_path, name, scale):
     assert written(tmp_path, name, lens(scale)).checks[-1].passed
     assert written(tmp_path, name, lampshade()).checks[-1].passed
+
+
+def leaf() -> Panel:
+    """Between y = -x^2 (100 - x) / 6000 and its mirror image: a tip without an angle at x = 0."""
+
+    def side(name: str, sign: float, *u: float) -> Edge:
+        return edge(
+            name,
+            lambda x: (
+                x,
+                sign * x**2 * (100.0 - x) / 6000.0,
+                np.ones_like(x),
+                sign * (200.0 * x - 3.0 * x**2) / 6000.0,
+            ),
+            *u,
+        )
+
+    area = 2.0 * 100.0**4 / 12.0 / 6000.0
+    return panel((side("base", -1.0, 0.0, 100.0), side("top", 1.0, 100.0, 0.0)), area)
+
+
+@pytest.mark.parametrize("curves", CURVES)
+@pytest.mark.parametrize("tolerance", [0.05, 5.0])
+def test_the_sides_of_a_tip_without_an_angle_do_not_cross(tmp_path, curves, tolerance):
+    """Where fitted within half a millimetre they would: they are fitted more closely then."""
+    (done,) = dxf.write(job(leaf(), tolerance=tolerance), tmp_path, Options(dxf_curves=curves))
+    assert done.note == "accepted by profile generic"
+    assert done.max_deviation <= 0.1 * tolerance
 
 
 # --- the same roles in SVG -------------------------------------------------------------------
