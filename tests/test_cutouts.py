@@ -93,3 +93,13 @@ def test_a_drill_through_the_cut_of_a_tube_takes_what_it_takes_elsewhere(tmp_pat
 def test_a_feature_far_from_the_sheet_is_told_so(tmp_path, surface):
     with pytest.raises(GeometryError, match="leaves the sheet"):
         built(tmp_path, surface + '[[cutout]]\nshape = "circle"\ndiameter = 5\nat = [1000, 50]\n')
+
+
+@pytest.mark.parametrize("normal", [[0, 1, 2], [-1, 1, -3], [0.3, 0, 1]])
+def test_an_oblique_cone_trimmed_aslant_is_exact_in_step(tmp_path, normal):
+    """Its edges are conics whose weights differ along a ruling: its images are quotients."""
+    cone = 'name = "cone"\n[surface]\nkind = "cone"\napex = [20, 0, 200]\nextent = [0.3, 1]\n'
+    cone += 'directrix = { kind = "circle", radius = 100 }\n'
+    trim = f"[[trim]]\nplane = [[0, 0, 60], {normal}]\n"
+    report = devcad.export(built(tmp_path, cone + trim), tmp_path / "out", formats=["step"])
+    assert report["files"][0]["max_deviation"] == 0.0

@@ -50,7 +50,9 @@ from devcad.export._step_body import (
     Line,
     Plane,
     Point,
+    Ruled,
     Straight,
+    Stretch,
     Surface,
     Trace,
     Use,
@@ -59,6 +61,7 @@ from devcad.geometry.fit import Spline
 from devcad.geometry.taylor import Array
 
 TOLERANCE = 1e-7  # mm: the kernel's own confusion distance
+EVEN = 1e-14  # weights as near to one another are equal
 
 _BUILDER = BRep_Builder()
 
@@ -122,9 +125,8 @@ def _wire(
     for use in reversed(loop) if face.flipped else loop:
         edge, plan = edges[use.edge], plans[use.edge]
         if use.trace is not None:
-            _BUILDER.UpdateEdge(
-                edge, _curve2d(use.trace, plan.span), surface, TopLoc_Location(), TOLERANCE
-            )
+            image = _curve2d(_evened(use.trace, face.surface, plan.span), plan.span)
+            _BUILDER.UpdateEdge(edge, image, surface, TopLoc_Location(), TOLERANCE)
             _BUILDER.Range(edge, surface, TopLoc_Location(), *plan.span)
         oriented = edge if use.forward != face.flipped else edge.Reversed()
         _BUILDER.Add(wire, oriented)
@@ -173,6 +175,23 @@ def _curve(curve: Curve, start: Array, end: Array) -> Geom_Curve | None:
     return Geom_BSplineCurve(poles, _reals(_weights(curve)), *_knots(curve), curve.degree)
 
 
+def _evened(trace: Trace, surface: Surface, span: tuple[float, float]) -> Trace:
+    """The trace of a ruling on a rational face whose edges weigh differently there: u is then no
+    even share of the ruling, but the quotient that gives each of its points its own place."""
+    if not isinstance(trace, Stretch) or not isinstance(surface, Ruled):
+        return trace
+    if trace.start[1] != trace.end[1] or (surface.low.weights is surface.high.weights is None):
+        return trace
+    low, high = (float(x.denominator(trace.start[1:])[0]) for x in (surface.low, surface.high))
+    start, end = ((1.0 - u) * low + u * high for u in (float(trace.start[0]), float(trace.end[0])))
+    if abs(start - end) <= EVEN * abs(start + end):
+        return trace
+    weights = np.array([[end, end], [start, start]])
+    return Spline(
+        1, np.repeat(np.array(span), 2), np.array([trace.start, trace.end]), weights=weights
+    )
+
+
 def _curve2d(trace: Trace, span: tuple[float, float]) -> Geom2d_Curve:
     if isinstance(trace, Straight):
         return Geom2d_Line(gp_Pnt2d(*trace.origin.tolist()), gp_Dir2d(*trace.direction.tolist()))
@@ -182,7 +201,9 @@ def _curve2d(trace: Trace, span: tuple[float, float]) -> Geom2d_Curve:
     poles = Array1_gp_Pnt2d(1, len(trace.poles))
     for k, pole in enumerate(trace.poles.tolist()):
         poles.SetValue(k + 1, gp_Pnt2d(*pole))
-    return Geom2d_BSplineCurve(poles, *_knots(trace), trace.degree)
+    if trace.weights is None:
+        return Geom2d_BSplineCurve(poles, *_knots(trace), trace.degree)
+    return Geom2d_BSplineCurve(poles, _reals(_weights(trace)), *_knots(trace), trace.degree)
 
 
 def _knots(spline: Spline) -> tuple[Array1_double, Array1_int]:
