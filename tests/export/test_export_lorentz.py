@@ -11,8 +11,9 @@ import pytest
 
 import devcad
 from devcad.errors import CheckFailed, GeometryError, JobError
-from devcad.export import Options, dxf, svg
+from devcad.export import Options, svg
 from devcad.export import lorentz as exporter
+from devcad.export.profile import profile
 from devcad.geometry.taylor import Array
 from devcad.part import Part
 
@@ -79,7 +80,8 @@ def test_it_says_what_it_is_and_has_no_layer_or_colour_of_a_cutter(tmp_path):
     (written,) = exporter.write(built(tmp_path, TIMELIKE), tmp_path, Options())
     root, groups = read(written.path)
     assert list(groups) == ["LORENTZ_RULING", "LORENTZ_OUTLINE", "LORENTZ_TEXT"]
-    assert not set(groups) & {*dxf.LAYERS, *svg.COLOURS}
+    cutters = {role.layer for role in profile("generic").roles.values()}
+    assert not set(groups) & {*cutters, *svg.COLOURS}
     colours = {g.get("stroke") for g in root.iter(f"{SVG}g")} - {"none"}
     assert not colours & set(svg.COLOURS.values())
     told = [text.text for text in groups["LORENTZ_TEXT"]]
