@@ -39,7 +39,7 @@ def sheet(tmp_path: Path, name: str) -> Part:
     """The sample without its thickness."""
     text = (SAMPLES / f"{name}.toml").read_text()
     kept = [line for line in text.splitlines() if not line.startswith(("thickness", "reference"))]
-    for table in SAMPLES.glob("*.csv"):
+    for table in (*SAMPLES.glob("*.csv"), *SAMPLES.glob("*.dxf")):
         (tmp_path / table.name).write_bytes(table.read_bytes())
     job = tmp_path / f"{name}.toml"
     job.write_text("\n".join(kept))

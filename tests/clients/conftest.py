@@ -84,8 +84,8 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
 def exports(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Exported | Exception]:
     """All jobs by name; one that does not build fails its own tests only."""
     home = tmp_path_factory.mktemp("jobs")
-    for table in SAMPLES.glob("*.csv"):
-        shutil.copy(table, home)
+    for beside in (*SAMPLES.glob("*.csv"), *SAMPLES.glob("*.dxf")):
+        shutil.copy(beside, home)
 
     def export(name: str, text: str) -> Exported | Exception:
         job = home / f"{name}.toml"
