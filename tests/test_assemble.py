@@ -195,6 +195,7 @@ def test_an_unbent_pointed_cone_with_thickness_is_built_at_once(tmp_path):
     assert volume(panel.mesh) == pytest.approx(2 * panel.facts["area"], abs=0.05 * 2 * 5000)
 
 
+@pytest.mark.slow
 def test_a_pipe_with_a_wavy_end_reaches_step(tmp_path):
     job = tmp_path / "job.toml"
     job.write_text(

@@ -146,6 +146,7 @@ def test_every_check_of_an_export_can_be_allowed_by_name(lamp: Part, tmp_path: P
 # --- the same bytes ------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_equal_jobs_give_equal_bytes(tmp_path: Path) -> None:
     """In two fresh interpreters with other hash seeds, in folders of other names."""
     path = job(tmp_path)

@@ -81,6 +81,7 @@ def test_scaling_the_part_scales_its_pattern(name, scale):
     )
 
 
+@pytest.mark.slow
 @given(equations=natural_equations())
 def test_a_tangent_surface_unrolls_to_the_turning_of_its_curve(equations):
     # the flat edge has the same curvature, so its turning is the integral of the curvature
@@ -132,6 +133,7 @@ def test_running_the_strip_backwards_gives_the_congruent_pattern(name):
     np.testing.assert_allclose(other.frame(s[1:-1]).n, patch.frame(t[1:-1]).n, atol=1e-12)
 
 
+@pytest.mark.slow
 @given(name=parts, share=st.floats(0.05, 0.95))
 def test_splitting_the_strip_changes_neither_pattern_nor_area(name, share):
     patch = PARTS[name]

@@ -418,6 +418,7 @@ def test_a_thick_crease_beside_a_rolled_patch_is_refused(tmp_path: Path) -> None
         export(panel, tmp_path)
 
 
+@pytest.mark.slow
 def test_equal_input_gives_equal_bytes_in_one_process_and_in_two(tmp_path: Path) -> None:
     both = parts.part(
         replace(parts.helix_strip(thickness=1.0), name="left"),

@@ -340,6 +340,7 @@ def test_another_shape_that_reads_back_is_a_failed_check(
         export(drawings.lens(), folder=tmp_path)
 
 
+@pytest.mark.slow
 def test_equal_input_gives_equal_bytes_in_one_process_and_in_two(tmp_path: Path) -> None:
     panels = replace(drawings.lampshade(), name="left"), replace(drawings.lens(), name="right")
     first = export(*panels, folder=tmp_path).path.read_bytes()

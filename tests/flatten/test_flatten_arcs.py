@@ -135,6 +135,7 @@ def test_the_certificate_holds_both_ways_and_is_tight(name, scale, tolerance):
     assert sizes.min() >= 0.01
 
 
+@pytest.mark.slow
 @settings(max_examples=20)
 @given(
     angle=st.floats(-3.0, 3.0),

@@ -166,6 +166,7 @@ def test_collocation_is_exact_for_many_turns():
     )  # 1e-12 of the pattern's 2 m
 
 
+@pytest.mark.slow
 def test_overlap_of_a_flat_spiral_is_measured_and_a_simple_sector_has_none():
     # a developed cone sector of 3 pi: the part beyond 2 pi lies on the part before
     wide = frustum(100.0, 50.0, 1e-4, sweep=3 * np.pi)

@@ -249,6 +249,7 @@ def test_what_is_no_helix_says_by_how_much(name: str) -> None:
     assert all(ratio.spread > 10.0 * ratio.limit for ratio in found.ratios.values())
 
 
+@pytest.mark.slow
 def test_a_chain_notes_what_jumps() -> None:
     u = np.linspace(0.0, 6.0, 12)
     points = np.column_stack([3 * np.cos(u), 3 * np.sin(u), 4 * u]).tolist()

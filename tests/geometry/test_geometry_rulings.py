@@ -117,6 +117,7 @@ def test_breaks_do_not_leave_a_patch_of_many_strips_below_its_tolerance(tmp_path
     assert 0.85 * 0.2 <= panel.mesh.deviation <= 0.2
 
 
+@pytest.mark.slow
 def test_an_edge_that_waves_three_hundred_times_is_seen(tmp_path):
     job = tmp_path / "job.toml"
     job.write_text(
