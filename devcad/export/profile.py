@@ -87,11 +87,6 @@ class Profile:
         cuts = (self.roles[role] for role in (OUTER, INNER, STITCH))
         return tuple(dict.fromkeys(role.layer for role in cuts if not role.shape))
 
-    @property
-    def bend_layers(self) -> tuple[str, ...]:
-        """The layers of bend lines."""
-        return tuple(dict.fromkeys(self.roles[role].layer for role in BENDS))
-
 
 @dataclass(frozen=True, slots=True)
 class Style:
