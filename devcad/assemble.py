@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,7 +18,6 @@ from devcad.facts import neutral_figures, panel_facts, rail_facts, strain
 from devcad.features import Features, Seam
 from devcad.flatten.bend import bent
 from devcad.flatten.blank import Blank, lay_flat
-from devcad.flatten.laying import laid
 from devcad.flatten.lorentz import Spacetime
 from devcad.flatten.neutral import Fibre
 from devcad.flatten.outline import lay_out, sheet_area
@@ -32,14 +31,15 @@ from devcad.geometry.patch import Patch
 from devcad.geometry.rail_fit import RailFit
 from devcad.geometry.rulings import place
 from devcad.geometry.taylor import Array
-from devcad.geometry.trimming import trimmed
 from devcad.mesh.build import build_mesh
 from devcad.mesh.mesh import Mesh
 from devcad.mesh.stations import Flat
 from devcad.part import Panel, Part
 from devcad.proofs import prove_pattern, prove_surface, volume_error
-from devcad.seams import joined
-from devcad.shop.limits import Bounds, limit_checks
+
+if TYPE_CHECKING:  # what most jobs do not ask for is loaded where one does
+    from devcad.geometry.seams import Meeting
+    from devcad.shop.limits import Bounds
 
 FLOAT32 = float(np.sqrt(3.0)) * 2.0**-24
 """Largest distance that rounding to float32 moves a point, per unit of its largest coordinate."""
@@ -91,7 +91,7 @@ class Making:
     tolerance: float = 0.05
     bend: float = 1.0
     fibre: Fibre | None = None
-    limits: Bounds = field(default_factory=Bounds)
+    limits: Bounds | None = None
     allow: frozenset[str] = frozenset()
 
     @property
@@ -122,7 +122,7 @@ def assemble(
     Raises:
         GeometryError, CheckFailed: with the panel's name.
     """
-    how = Making(thickness, reference, tolerance, bend, fibre, limits or Bounds(), allow)
+    how = Making(thickness, reference, tolerance, bend, fibre, limits, allow)
     made: list[Panel] = []
     blanks: list[Blank] = []
     checks: list[Check] = []
@@ -136,16 +136,21 @@ def assemble(
         made.append(panel)
         blanks.append(blank)
         checks += proven
-    panels, meetings, met = joined(
-        made,
-        [blank.middle for blank in blanks],
-        [blank.developments for blank in blanks],
-        seams,
-        reference=reference,
-        tolerance=tolerance,
-    )
-    require(met, allow)
-    checks += met
+    panels: tuple[Panel, ...] = tuple(made)
+    meetings: tuple[Meeting, ...] = ()
+    if seams:
+        from devcad.seams import joined
+
+        panels, meetings, met = joined(
+            made,
+            [blank.middle for blank in blanks],
+            [blank.developments for blank in blanks],
+            seams,
+            reference=reference,
+            tolerance=tolerance,
+        )
+        require(met, allow)
+        checks += met
     if len(panels) == 1:  # a job of one panel need not be told which
         checks = [replace(check, panel=panels[0].name) for check in checks]
     return Part(name, panels, thickness, tolerance, tuple(checks), seams=meetings)
@@ -170,7 +175,12 @@ def _panel(spec: PanelSpec, how: Making) -> tuple[Panel, Blank, list[Check]]:
         how = replace(how, allow=how.allow | set(FOLLOWS["twist"]))
     stuff = _stuff(spec, how)
     middle, blank = stuff.middle, lay_flat(stuff.middle, how.fibre)
-    cuts, marks = laid(stuff.features, blank.divided, blank.developments, blank.jumps)
+    cuts: tuple[Cut, ...] = ()
+    marks: tuple[Drawing, ...] = ()
+    if stuff.features.cutouts or stuff.features.marks:
+        from devcad.flatten.laying import laid
+
+        cuts, marks = laid(stuff.features, blank.divided, blank.developments, blank.jumps)
     chain = middle if how.bend == 1.0 else bent(blank, how.bend)
     # what ran over the seam of a tube ends at the edges of the open sheet that it becomes
     holes = opened(cuts, chain.patches) if middle.closed and not chain.closed else cuts
@@ -186,7 +196,10 @@ def _panel(spec: PanelSpec, how: Making) -> tuple[Panel, Blank, list[Check]]:
     if not blank.isometric:
         panel = replace(panel, surface_area=sheet_area(chain, holes))
     checks = stuff.checks + prove_pattern(panel, blank, tolerance=how.tolerance)
-    checks += limit_checks(panel, middle, how.fibre, how.limits)
+    if how.limits is not None:
+        from devcad.shop.limits import limit_checks
+
+        checks += limit_checks(panel, middle, how.fibre, how.limits)
     require(checks, how.allow)
     failed = sorted({check.name for check in checks if not check.passed})
     facts: dict[str, Any] = panel_facts(panel, middle, shapes, checks, any(stuff.apex), failed)
@@ -238,6 +251,8 @@ def _described(spec: PanelSpec, tolerance: float) -> tuple[Chain, tuple[Drawing,
     drawings = tuple(drawing.scaled(spec.mm_per_unit) for drawing in spec.drawings)
     features, base_closed = spec.features.moved(matrix), spec.base_closed
     for trim in features.trims:
+        from devcad.geometry.trimming import trimmed
+
         try:
             left = trimmed(patches, trim.point, trim.normal, base_closed=base_closed)
         except GeometryError as error:

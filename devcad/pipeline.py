@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from devcad.assemble import PanelSpec, assemble
 from devcad.checks import FOLLOWS, Check, at_most, require
@@ -19,9 +19,11 @@ from devcad.part import Panel, Part
 from devcad.proofs import mesh_volume
 from devcad.report import SvgOrigin, make_report, to_bytes
 from devcad.shop.fibre import fibre
-from devcad.shop.kerf import kerfed
-from devcad.shop.limits import bounds
 from devcad.shop.materials import Material, material
+from devcad.shop.settings import Limits
+
+if TYPE_CHECKING:
+    from devcad.shop.limits import Bounds
 
 Progress = Callable[[str], None]
 """Told what begins now."""
@@ -107,7 +109,7 @@ def build(
             tolerance=job.tolerance,
             bend=job.bend,
             fibre=fibre(recipe.shop.neutral, sheet, job.thickness),
-            limits=bounds(recipe.shop.limits, recipe.shop.bends, sheet, job.thickness),
+            limits=_bounds(recipe, sheet, job.thickness),
             seams=job.seams,
             allow=recipe.allow,
         )
@@ -153,7 +155,11 @@ def export(
     allowed = frozenset(was_allowed.union(known_checks(list(allow))))
     target = Path(out, part.name)
     how = options or Options()
-    cut = kerfed(part, how.kerf) if CUT_FILES.intersection(chosen) else part
+    cut = part
+    if how.kerf and CUT_FILES.intersection(chosen):
+        from devcad.shop.kerf import kerfed
+
+        cut = kerfed(part, how.kerf)
     with published(Path(out), part.name) as folder:
         written: list[Written] = []
         for name in sorted(chosen, key=LAST.__contains__):
@@ -176,6 +182,15 @@ def export(
         with _naming(target, REPORT):
             (folder / REPORT).write_bytes(to_bytes(report))
     return report
+
+
+def _bounds(recipe: Recipe, sheet: Material | None, thickness: float) -> Bounds | None:
+    """The limits of a sheet with thickness, None where neither recipe nor material knows one."""
+    if not thickness or (sheet is None and recipe.shop.limits == Limits()):
+        return None
+    from devcad.shop.limits import bounds
+
+    return bounds(recipe.shop.limits, recipe.shop.bends, sheet, thickness)
 
 
 def kerf_noted(files: list[Written], kerf: float) -> list[Written]:

@@ -14,7 +14,6 @@ from devcad.features import Cutout, Drill, Features, Mark, Placing, Seam, Trim
 from devcad.flatten.rings import Contour
 from devcad.geometry.edge import Edge
 from devcad.geometry.values import unit
-from devcad.importers.dxf import read_contours
 from devcad.job import featuretables as tables
 from devcad.job.invalid import problems, unknown_kind
 
@@ -118,6 +117,8 @@ class Reading:
         """The contours of a drawing, read once however often it is named."""
         key = table.file.name, table.layer
         if key not in self.drawings:
+            from devcad.importers.dxf import read_contours
+
             self.drawings[key] = read_contours(
                 table.file.data,
                 layer=table.layer,

@@ -17,7 +17,6 @@ from pydantic import AfterValidator, Field, PlainValidator, WithJsonSchema, mode
 
 from devcad.errors import JobError
 from devcad.flatten import shapes
-from devcad.flatten.lettering import lettering, require_letters
 from devcad.flatten.rings import Contour, self_crossing
 from devcad.geometry.curves import Degrees, Direction, Flag, Model, Number, Positive, Vector
 
@@ -57,6 +56,8 @@ def _drawing(value: Any) -> DrawingFile:
 
 def _letters(value: str) -> str:
     """A text whose characters all have strokes."""
+    from devcad.flatten.lettering import require_letters
+
     require_letters(value)
     return value
 
@@ -248,6 +249,8 @@ class TextMark(Placed):
 
     def lines(self, mm: float) -> Contour:
         """Its edges in mm."""
+        from devcad.flatten.lettering import lettering
+
         return lettering(self.text, mm * self.height)
 
 

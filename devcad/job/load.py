@@ -17,12 +17,9 @@ from devcad.features import Features, Seam
 from devcad.geometry.constructions import SURFACES
 from devcad.geometry.constructions.base import Surface
 from devcad.geometry.taylor import Array
-from devcad.importers.dxf import MAX_BYTES as MAX_DRAWING_BYTES
 from devcad.importers.files import decode, inside, read_bytes
 from devcad.importers.table import parse_points
 from devcad.importers.toml import parse_toml
-from devcad.job.features import Reading
-from devcad.job.featuretables import DrawingFile
 from devcad.job.invalid import below, problems, raise_all, shown, unknown_kind
 from devcad.job.recipe import RecipeTable
 from devcad.job.tables import EdgesTable, JobTable, MetaTable, PanelTable, PlaceTable
@@ -172,12 +169,16 @@ def _drawing_tables(tree: dict[str, Any], place: str) -> Iterator[tuple[dict[str
 
 def _drawing(table: dict[str, Any], folder: Path, place: str, read: dict[str, bytes]) -> bytes:
     """Put the bytes of a drawing beside its name; returns them where they are not ``read`` yet."""
+    from devcad.job.featuretables import DrawingFile
+
     name = table["file"]
     known = name in read
     if not known:
+        from devcad.importers.dxf import MAX_BYTES
+
         path = inside(folder, name, place=below(place, "file"))
         where = f"{below(place, 'file')} > {name}"
-        read[name] = read_bytes(path, limit=MAX_DRAWING_BYTES, place=where)
+        read[name] = read_bytes(path, limit=MAX_BYTES, place=where)
     table["file"] = DrawingFile(name, read[name])
     return b"" if known else read[name]
 
@@ -195,14 +196,8 @@ def job_of(tree: dict[str, Any], place: str, sha256: str) -> Job:
     assert table is not None  # raise_all spoke otherwise
     names = [panel.name for panel in table.panel or ()] or [table.name]
     places = [panel.place for panel in table.panel or ()] or [table.place]
-    reading = Reading(scale)
-    features = [
-        reading.features(owner.cutout, owner.mark, owner.trim, where)
-        for owner, where in _owners(table, place)
-    ]
+    features, seams = _features(table, scale, place)
     finishes = [_finishes(owner.edges, scale) for owner, _ in _owners(table, place)]
-    seams = reading.seams(table.seam, place)
-    raise_all(sorted(reading.found, key=lambda error: -error.code))
     return Job(
         name=table.name,
         path=place,
@@ -225,6 +220,20 @@ def job_of(tree: dict[str, Any], place: str, sha256: str) -> Job:
         ),
         seams=seams,
     )
+
+
+def _features(table: JobTable, scale: float, place: str) -> tuple[list[Features], tuple[Seam, ...]]:
+    """The features of every panel, and the seams; all their problems at once."""
+    owners = list(_owners(table, place))
+    if not table.seam and not any(o.cutout or o.mark or o.trim for o, _ in owners):
+        return [Features()] * len(owners), ()
+    from devcad.job.features import Reading  # most jobs need none of its tables
+
+    reading = Reading(scale)
+    features = [reading.features(o.cutout, o.mark, o.trim, where) for o, where in owners]
+    seams = reading.seams(table.seam, place)
+    raise_all(sorted(reading.found, key=lambda error: -error.code))
+    return features, seams
 
 
 def _owners(table: JobTable, place: str) -> Iterator[tuple[JobTable | PanelTable, str]]:

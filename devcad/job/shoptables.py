@@ -31,7 +31,12 @@ class Table(BaseModel):
     """
 
     model_config = ConfigDict(
-        extra="forbid", frozen=True, strict=True, allow_inf_nan=False, validate_by_name=False
+        defer_build=True,  # a recipe speaks of two or three of the many tables
+        extra="forbid",
+        frozen=True,
+        strict=True,
+        allow_inf_nan=False,
+        validate_by_name=False,
     )
     choices: ClassVar[tuple[tuple[str, ...], ...]] = ()
 

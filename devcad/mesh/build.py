@@ -8,7 +8,6 @@ from devcad.geometry.chain import Chain
 from devcad.geometry.cuts import Cut
 from devcad.geometry.taylor import Array, rows_cross
 from devcad.mesh.mesh import Mesh
-from devcad.mesh.perforated import perforated
 from devcad.mesh.stations import Flat, Stations, share
 from devcad.mesh.strips import faces, joined
 
@@ -36,6 +35,8 @@ def build_mesh(
         GeometryError: the cuts cross each other, or leave a sheet that hangs on a point.
     """
     if cuts:
+        from devcad.mesh.perforated import perforated  # most sheets have no holes
+
         return perforated(chain, rulings, layers, flat, deviation, cuts, tolerance)
     stations = [
         Stations(k, patch, t, layers, flat, chain)

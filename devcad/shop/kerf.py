@@ -18,13 +18,9 @@ FINE = 1e-5  # of the pattern's size: the sagitta of polygons that may not cross
 def kerfed(part: Part, kerf: float) -> Part:
     """The part with the patterns that its cut files show: as :func:`with_kerf` for every panel.
 
-    Without a kerf it is the part itself.
-
     Raises:
         GeometryError: as :func:`with_kerf`, with the panel.
     """
-    if kerf == 0.0:
-        return part
     panels = []
     for panel in part.panels:
         try:

@@ -48,13 +48,10 @@ class Bounds:
 
 
 def bounds(limits: Limits, bends: Bends, material: Material | None, thickness: float) -> Bounds:
-    """The limits of a sheet: the recipe's, else the material's; none without thickness.
+    """The limits of a sheet of a ``thickness`` in mm: the recipe's, else the material's.
 
     Springback is looked at where the recipe asks for it and the material is known.
     """
-    if not thickness:
-        return Bounds()
-
     def mm(share: float | None) -> float | None:
         return None if share is None else share * thickness
 
