@@ -25,7 +25,7 @@ from devcad.geometry.chain import SMOOTH, Chain, cut_at, link, with_gap
 from devcad.geometry.classify import Shape, classify, patch_box
 from devcad.geometry.cuts import Cut, opened
 from devcad.geometry.drawing import Drawing, carried
-from devcad.geometry.layers import at_apex, layer_gaps, straight_sided
+from devcad.geometry.layers import at_apex, pull_of
 from devcad.geometry.parallel import parallel_chain
 from devcad.geometry.patch import Patch
 from devcad.geometry.rail_fit import RailFit
@@ -38,19 +38,18 @@ from devcad.part import Panel, Part
 from devcad.proofs import prove_pattern, prove_surface, volume_error
 
 if TYPE_CHECKING:  # what most jobs do not ask for is loaded where one does
+    from devcad.geometry.fillets import Corner
     from devcad.geometry.seams import Meeting
     from devcad.shop.limits import Bounds
+    from devcad.shop.pressbrake import Pressed
+    from devcad.shop.settings import Bends
 
 FLOAT32 = float(np.sqrt(3.0)) * 2.0**-24
 """Largest distance that rounding to float32 moves a point, per unit of its largest coordinate."""
 ATTEMPTS = 4
 """How often the rulings are placed anew for the sake of a thick sheet's volume."""
-APART = 1e-6
-"""Layers of neighbouring patches miss each other by more than this share of the thickness."""
 NOTHING = 1e-9
 """A panel of which cutouts leave less than this share is gone."""
-STEEPEST_MITRE = np.radians(150.0)
-"""A crease of a thick sheet beyond this has no sensible mitre (design.md, section 7)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,6 +83,8 @@ class Making:
 
     ``fibre`` keeps its length when the sheet is bent: the pattern is its development, or the
     middle's where it is None. ``limits`` are the shop's. ``allow`` names checks that may fail.
+    ``inside_radius`` (mm) is that of every crease, None where creases are sharp. ``bends`` say how
+    a press brake bends the sheet, None where it is rolled.
     """
 
     thickness: float = 0.0
@@ -93,6 +94,8 @@ class Making:
     fibre: Fibre | None = None
     limits: Bounds | None = None
     allow: frozenset[str] = frozenset()
+    inside_radius: float | None = None
+    bends: Bends | None = None
 
     @property
     def layers(self) -> tuple[float, ...]:
@@ -112,17 +115,19 @@ def assemble(
     limits: Bounds | None = None,
     seams: Sequence[Seam] = (),
     allow: frozenset[str] = frozenset(),
+    inside_radius: float | None = None,
+    bends: Bends | None = None,
 ) -> Part:
     """The part made of these panels, with every geometric check it passed.
 
     Args:
-        thickness, reference, tolerance, bend, fibre, limits, allow: as in :class:`Making`. The
-            pattern is the same for every bend.
+        thickness, reference, tolerance, bend, fibre, limits, allow, inside_radius, bends: as in
+            :class:`Making`. The pattern is the same for every bend.
         seams: the edges of the panels that are to meet.
     Raises:
         GeometryError, CheckFailed: with the panel's name.
     """
-    how = Making(thickness, reference, tolerance, bend, fibre, limits, allow)
+    how = Making(thickness, reference, tolerance, bend, fibre, limits, allow, inside_radius, bends)
     made: list[Panel] = []
     blanks: list[Blank] = []
     checks: list[Check] = []
@@ -159,7 +164,7 @@ def assemble(
 @dataclass(frozen=True, slots=True)
 class _Stuff:
     """The middle surface of a panel, proven: what its patches are and which reach an apex, what is
-    drawn on it, its features, and the checks that it passed."""
+    drawn on it, its features, the checks that it passed, and where its bends want relief."""
 
     middle: Chain
     shapes: tuple[Shape, ...]
@@ -167,6 +172,7 @@ class _Stuff:
     drawings: tuple[Drawing, ...]
     features: Features
     checks: list[Check]
+    corners: tuple[Corner, ...] = ()
 
 
 def _panel(spec: PanelSpec, how: Making) -> tuple[Panel, Blank, list[Check]]:
@@ -177,39 +183,82 @@ def _panel(spec: PanelSpec, how: Making) -> tuple[Panel, Blank, list[Check]]:
     middle, blank = stuff.middle, lay_flat(stuff.middle, how.fibre)
     cuts: tuple[Cut, ...] = ()
     marks: tuple[Drawing, ...] = ()
-    if stuff.features.cutouts or stuff.features.marks:
+    features = stuff.features
+    reliefs: tuple[str, ...] = ()
+    if stuff.corners and how.inside_radius:
+        from devcad.flatten.relief import relieved
+
+        features, reliefs = relieved(
+            features, stuff.corners, blank, how.thickness, how.inside_radius
+        )
+    if features.cutouts or features.marks:
         from devcad.flatten.laying import laid
 
-        cuts, marks = laid(stuff.features, blank.divided, blank.developments, blank.jumps)
-    chain = middle if how.bend == 1.0 else bent(blank, how.bend)
+        cuts, marks = laid(features, blank.divided, blank.developments, blank.jumps)
+    brake = None if how.bends is None else _pressed(spec.name, blank, how, how.bends)
+    chain = brake.chain if brake else middle if how.bend == 1.0 else bent(blank, how.bend)
     # what ran over the seam of a tube ends at the edges of the open sheet that it becomes
-    holes = opened(cuts, chain.patches) if middle.closed and not chain.closed else cuts
-    mesh, rulings = _meshed(chain, how, blank.points, holes)
-    drawings = (*stuff.drawings, *marks)
+    holes = opened(cuts, middle.patches) if middle.closed and not chain.closed else cuts
+    shapes = shapes3d = stuff.shapes
+    if chain is not middle:
+        shapes3d = tuple(classify(patch) for patch in chain.patches)
+    if brake:
+        holes = brake.carried(holes)
+        if how.thickness:
+            from devcad.geometry.thickness import refuse_creases
+
+            refuse_creases(chain, shapes3d, how.layers[-1])
+    mesh, rulings = _meshed(chain, how, brake.places if brake else blank.points, holes)
     pattern = lay_out(
-        blank.chain, blank.developments, rulings, drawings, cuts, bending=middle.patches
+        blank.chain,
+        blank.developments,
+        rulings,
+        (*stuff.drawings, *marks),
+        cuts,
+        bending=middle.patches,
+        bends=brake.lines if brake else None,
     )
-    shapes = stuff.shapes
-    shapes3d = shapes if how.bend == 1.0 else tuple(classify(patch) for patch in chain.patches)
     panel = Panel(spec.name, spec.kind, chain, shapes3d, how.thickness, rulings, mesh, pattern)
     panel = replace(panel, spacetime=_spacetime(spec, middle), cuts=holes, blank=blank)
-    if not blank.isometric:
+    if brake:
+        panel = replace(panel, bends=brake.bends, facets=tuple(z.flat for z in brake.zones))
+    if not blank.isometric if brake is None else not brake.exact:
         panel = replace(panel, surface_area=sheet_area(chain, holes))
     checks = stuff.checks + prove_pattern(panel, blank, tolerance=how.tolerance)
+    if brake:
+        checks = brake.proven(checks)
     if how.limits is not None:
         from devcad.shop.limits import limit_checks
 
-        checks += limit_checks(panel, middle, how.fibre, how.limits)
+        bent_to = brake.limited if brake else middle
+        checks += limit_checks(panel, bent_to, how.fibre, how.limits)
     require(checks, how.allow)
     failed = sorted({check.name for check in checks if not check.passed})
     facts: dict[str, Any] = panel_facts(panel, middle, shapes, checks, any(stuff.apex), failed)
-    if not blank.isometric:
+    if brake and not brake.exact:
+        facts["area"] = sheet_area(brake.full, holes)
+    elif not blank.isometric and not brake:
         facts["area"] = sheet_area(middle, cuts)  # bent to the end, whatever ``bend`` is
     figures = {**spec.figures, **strain(checks), **neutral_figures(blank)}
-    facts |= {"figures": figures, "notes": list(spec.notes)}
+    figures |= brake.figures if brake else {}
+    facts |= {"figures": figures, "notes": [*spec.notes, *reliefs]}
     if spec.rail_fit is not None:
         facts |= rail_facts(spec.rail_fit, spec.mm_per_unit)
     return replace(panel, facts=facts), blank, checks
+
+
+def _pressed(name: str, blank: Blank, how: Making, bends: Bends) -> Pressed:
+    from devcad.shop.pressbrake import pressed
+
+    return pressed(
+        name,
+        blank,
+        bends,
+        thickness=how.thickness,
+        bend=how.bend,
+        tolerance=how.tolerance,
+        flow=how.limits.springback if how.limits else None,
+    )
 
 
 def _stuff(spec: PanelSpec, how: Making) -> _Stuff:
@@ -218,9 +267,18 @@ def _stuff(spec: PanelSpec, how: Making) -> _Stuff:
     described, drawings, features = _described(spec, how.tolerance)
     checks = prove_surface(spec.name, described, (0.0,), reaches_apex=False, fit=spec.rail_fit)
     require(checks, how.allow)
+    gap = spec.gap
+    corners: tuple[Corner, ...] = ()
+    if how.inside_radius and described.creased:
+        from devcad.geometry.fillets import bends_made
+
+        described, corners = bends_made(
+            described, how.inside_radius, thickness, how.reference, gap=gap, drawings=drawings
+        )
+        gap = 0.0
     middle = _middle(described, thickness, how.reference)
-    if spec.gap:
-        middle = with_gap(middle, spec.gap)
+    if gap:
+        middle = with_gap(middle, gap)
     elif thickness and middle.closes is False and (middle.closing_angle or 0.0) <= SMOOTH:
         raise GeometryError(
             "the extent does not return to its start although the ruling does: the walls at both "
@@ -235,12 +293,18 @@ def _stuff(spec: PanelSpec, how: Making) -> _Stuff:
     shapes = tuple(classify(patch) for patch in middle.patches)
     apex = _reaches_apex(middle, shapes)
     if thickness:
-        _refuse_creases(middle, shapes)
-        _refuse_thick_apex(shapes, apex)
-        _refuse_layers_apart(middle, layers)
+        from devcad.geometry.thickness import (
+            refuse_creases,
+            refuse_layers_apart,
+            refuse_thick_apex,
+        )
+
+        refuse_creases(middle, shapes, layers[-1])
+        refuse_thick_apex(shapes, apex)
+        refuse_layers_apart(middle, layers)
         checks = prove_surface(spec.name, middle, layers, reaches_apex=any(apex), fit=spec.rail_fit)
         require(checks, how.allow)
-    return _Stuff(middle, shapes, apex, drawings, features, checks)
+    return _Stuff(middle, shapes, apex, drawings, features, checks, corners)
 
 
 def _described(spec: PanelSpec, tolerance: float) -> tuple[Chain, tuple[Drawing, ...], Features]:
@@ -294,8 +358,10 @@ def _meshed(
     area = sheet_area(chain, cuts)
     if area <= NOTHING * sheet_area(chain, ()):
         raise GeometryError("the cutouts leave nothing of the panel", remedy="make them smaller")
+    pulls = [pull_of(chain, number, layers[-1]) for number in range(len(chain.patches))]
     for _ in range(ATTEMPTS):
-        placements = [place(patch, layers, aim) for patch in chain.patches]
+        every = zip(chain.patches, pulls, strict=True)
+        placements = [place(patch, layers, aim, pull) for patch, pull in every]
         rulings = tuple(placement.t for placement in placements)
         deviation = max(placement.deviation for placement in placements)
         mesh = build_mesh(chain, rulings, layers, places, deviation, cuts, aim)
@@ -315,57 +381,3 @@ def _reaches_apex(chain: Chain, shapes: tuple[Shape, ...]) -> tuple[bool, ...]:
         singular = at_apex(frame, frame.v_from) or at_apex(frame, frame.v_to)
         out.append(singular and shape.type in ("cone", "plane"))
     return tuple(out)
-
-
-def _refuse_creases(chain: Chain, shapes: tuple[Shape, ...]) -> None:
-    """Thick creases are mitred between straight-sided planes up to 150 degrees, else refused."""
-    around = list(chain.joints) + ([chain.closing] if chain.closing else [])
-    for k, joint in enumerate(around):
-        if joint.smooth:
-            continue
-        after = (k + 1) % len(shapes)
-        t = float(chain.patches[after].domain[0])
-        angle = float(np.degrees(abs(joint.angle)))
-        planes = shapes[k].type == "plane" and shapes[after].type == "plane"
-        if not planes or not (
-            straight_sided(chain.patches[k]) and straight_sided(chain.patches[after])
-        ):
-            raise GeometryError(
-                f"a crease of {angle:.4g} deg at t = {t:.6g} in a sheet with thickness, between "
-                "faces that are not plane with straight edges",
-                value=angle,
-                remedy="round it with corner_radius, or give the part no thickness",
-            )
-        if abs(joint.angle) > STEEPEST_MITRE:
-            raise GeometryError(
-                f"a crease of {angle:.4g} deg at t = {t:.6g} in a sheet with thickness, "
-                "limit 150 deg",
-                value=angle,
-                limit=150.0,
-                remedy="round it with corner_radius",
-            )
-
-
-def _refuse_layers_apart(chain: Chain, layers: tuple[float, ...]) -> None:
-    """The layers of neighbours meet along their ruling, unless one alone ends in an apex there."""
-    for number, gap in enumerate(layer_gaps(chain, layers)):
-        if gap > APART * (layers[-1] - layers[0]):
-            raise GeometryError(
-                f"regular: the layers of a thick sheet miss each other by {gap:.3g} mm at the "
-                f"joint t = {chain.patches[number].domain[1]:.6g}, where an apex in the middle of "
-                "the sheet ends on one side only",
-                value=gap,
-                limit=0.0,
-                remedy="give the part no thickness",
-            )
-
-
-def _refuse_thick_apex(shapes: tuple[Shape, ...], apex: tuple[bool, ...]) -> None:
-    for shape, reached in zip(shapes, apex, strict=True):
-        if reached and shape.type != "plane" and shape.half_angle is None:
-            raise GeometryError(
-                "regular: the layers of a thick sheet end apart from one another at the apex of "
-                "a cone that is not a right circular one",
-                remedy="keep the sheet off the apex (a shorter extent, a rounded corner, trim), or "
-                "give the part no thickness: the pattern of its middle is the same",
-            )

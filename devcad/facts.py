@@ -11,6 +11,7 @@ from devcad.flatten.blank import Blank
 from devcad.flatten.green import enclosed_area, perimeter
 from devcad.flatten.lorentz import lorentz_area
 from devcad.flatten.neutral import least_k, left_over
+from devcad.flatten.pattern import Pattern
 from devcad.geometry.chain import Chain
 from devcad.geometry.classify import EXACT, Shape, sample_parameters
 from devcad.geometry.rail_fit import RailFit
@@ -31,7 +32,7 @@ def panel_facts(
     fibre = panel.blank.fibre if panel.blank else None
     radius = min(smallest_radius(patch).value for patch in middle.patches)
     angle = middle.closing_angle
-    contours = (panel.pattern.outline, *panel.pattern.holes)
+    flat = pattern_facts(panel.pattern)
     return {
         "name": panel.name,
         "kind": panel.kind,
@@ -44,8 +45,8 @@ def panel_facts(
         "watertight": panel.mesh.watertight,
         "apex": apex,
         "area": panel.area,
-        "flat_area": sum(enclosed_area(contour) for contour in contours),
-        "flat_bbox": list(panel.pattern.bbox),
+        "flat_area": flat["flat_area"],
+        "flat_bbox": flat["flat_bbox"],
         "min_radius": _finite(radius),
         "max_twist_deg": _finite(by_name["twist"].value),
         "max_crease_deg": None,
@@ -60,11 +61,22 @@ def panel_facts(
         ],
         "regression": _regression(middle, shapes),
         "ruling_count": sum(len(t) - 1 for t in panel.rulings) + 1,
-        "cut_length": sum(perimeter(contour) for contour in contours),
-        "pierces": 1 + len(panel.pattern.holes),
+        "cut_length": flat["cut_length"],
+        "pierces": flat["pierces"],
         "mass_g": None,
         "lorentz_area": None if panel.spacetime is None else lorentz_area(panel.spacetime),
         "allowed": allowed,
+    }
+
+
+def pattern_facts(pattern: Pattern) -> dict[str, Any]:
+    """What the report says of a pattern as it is cut: area, box, length and number of the cuts."""
+    contours = (pattern.outline, *pattern.holes)
+    return {
+        "flat_area": sum(enclosed_area(contour) for contour in contours),
+        "flat_bbox": list(pattern.bbox),
+        "cut_length": sum(perimeter(contour) for contour in contours),
+        "pierces": len(contours),
     }
 
 

@@ -26,12 +26,15 @@ class Cutout:
     """A closed contour about its own origin, counterclockwise, cut out of the pattern.
 
     ``place`` is where the job file says so; ``notch`` lets it cross edges and other cutouts.
+    ``patches`` are the first and the last patch of the chain that it touches, where the pattern
+    may pass it again: beyond the seam of a tube the numbers go on. None: all that it lies on.
     """
 
     place: str
     contour: tuple[Edge, ...]
     placing: Placing
     notch: bool = False
+    patches: tuple[int, int] | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from devcad.checks import Check
 from devcad.flatten.blank import Blank
@@ -16,6 +16,10 @@ from devcad.geometry.seams import Meeting
 from devcad.geometry.taylor import Array
 from devcad.mesh.mesh import Mesh
 
+if TYPE_CHECKING:  # most panels are not pressed
+    from devcad.flatten.bending import BendLine
+    from devcad.geometry.patch import Patch
+
 
 @dataclass(frozen=True, slots=True)
 class Panel:
@@ -27,7 +31,9 @@ class Panel:
     ``facts`` are the panel's entries for the report. ``spacetime`` is the middle surface, not
     bent, in Minkowski space, where it was constructed there. ``blank`` is what the pattern was
     laid out from, with the middle surface bent to the end; ``surface_area`` the area in mm2 of
-    ``chain`` without what is cut out, None where the pattern has the same.
+    ``chain`` without what is cut out, None where the pattern has the same. ``bends`` are the
+    bend lines of a panel that a press brake bends, and ``facets`` the patterns of its patches,
+    plane patches too, which are more than those of the blank.
     """
 
     name: str
@@ -43,6 +49,20 @@ class Panel:
     cuts: tuple[Cut, ...] = ()
     blank: Blank | None = None
     surface_area: float | None = None
+    bends: tuple[BendLine, ...] = ()
+    facets: tuple[Patch, ...] = ()
+
+    def places(self, number: int, t: Array, v: Array) -> Array:
+        """The places (n, 2) in the pattern of points (t, v), each (n,), of a patch of the chain.
+
+        Raises:
+            ValueError: a panel that is known by its pattern alone.
+        """
+        if self.facets:
+            return self.facets[number].point(t, v)[:, :2]
+        if self.blank is None:
+            raise ValueError(f"panel {self.name} has no blank")
+        return self.blank.points(number, t, v)
 
     @property
     def area(self) -> float:

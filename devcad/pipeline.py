@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 from devcad.assemble import PanelSpec, assemble
 from devcad.checks import FOLLOWS, Check, at_most, require
-from devcad.errors import DevcadError, FileError, JobError
+from devcad.errors import DevcadError, FileError
 from devcad.export import DEFAULT_FORMATS, LAST, Options, Written, writer
-from devcad.export.folder import REPORT, published, unwritable
+from devcad.export.folder import PAGE, REPORT, published, unwritable
 from devcad.job.load import Job, JobPanel, load
 from devcad.job.recipe import Recipe, known_checks, known_formats, resolve
 from devcad.part import Panel, Part
@@ -23,6 +23,7 @@ from devcad.shop.materials import Material, material
 from devcad.shop.settings import Limits
 
 if TYPE_CHECKING:
+    from devcad.finishing import Edges
     from devcad.shop.limits import Bounds
 
 Progress = Callable[[str], None]
@@ -59,26 +60,6 @@ def plan(
         raise error.at(place="" if pipeline else f"{job.path} > pipeline") from None
 
 
-def _refuse_later_work(job: Job, recipe: Recipe) -> None:
-    """JobError where a job asks for work on the pattern that nothing does yet: a key that is
-    read and not obeyed would spoil material."""
-    shop = recipe.shop
-    asked = {
-        "recipe.bends": shop.bends.mode == "press-brake",
-        "recipe.stitch": shop.stitch is not None,
-        "recipe.notches": shop.notches is not None,
-        "recipe.labels": shop.labels is not None,
-        "edges": any(panel.edges for panel in job.panels),
-    }
-    for key in (key for key, there in asked.items() if there):
-        raise JobError(
-            "this version reads these keys and does not do the work",
-            place=f"{job.path} > {key}",
-            value=key,
-            remedy="leave them out",
-        )
-
-
 def build(
     job: Job | str | Path,
     *,
@@ -96,14 +77,14 @@ def build(
     """
     job = job if isinstance(job, Job) else load(job)
     recipe = plan(job, pipeline=pipeline, allow=allow)
-    _refuse_later_work(job, recipe)
     sheet = material(job.material) if job.material else None
     progress(f"{job.name}: geometry")
     try:
-        specs = [spec for panel in job.panels for spec in _specs(panel, job)]
+        made = [(panel, spec) for panel in job.panels for spec in _specs(panel, job)]
+        edges = {spec.name: panel.edges for panel, spec in made}
         part = assemble(
             job.name,
-            specs,
+            [spec for _, spec in made],
             thickness=job.thickness,
             reference=job.reference,
             tolerance=job.tolerance,
@@ -112,9 +93,16 @@ def build(
             limits=_bounds(recipe, sheet, job.thickness),
             seams=job.seams,
             allow=recipe.allow,
+            inside_radius=recipe.shop.bends.inside_radius,
+            bends=recipe.shop.bends if recipe.shop.bends.mode == "press-brake" else None,
         )
+        return _finished(_named(part, job, sheet), job, recipe, edges)
     except DevcadError as error:
         raise _placed(error, job) from None
+
+
+def _named(part: Part, job: Job, sheet: Material | None) -> Part:
+    """The part with what the job says of it beside its shape."""
     return replace(
         part,
         panels=tuple(_weighed(panel, sheet) for panel in part.panels),
@@ -130,6 +118,17 @@ def build(
     )
 
 
+def _finished(part: Part, job: Job, recipe: Recipe, edges: Edges) -> Part:
+    """The part with what the shop adds to its patterns, if anything is asked for."""
+    shop = recipe.shop
+    sewn = bool(job.seams) and (shop.stitch is not None or shop.notches is not None)
+    if not (sewn or any(edges.values()) or shop.labels is not None or part.grain is not None):
+        return part
+    from devcad.finishing import finished
+
+    return finished(part, shop, edges, reference=job.reference, allow=recipe.allow)
+
+
 def export(
     part: Part,
     out: str | Path,
@@ -139,7 +138,7 @@ def export(
     allow: Iterable[str] = (),
     progress: Progress = _silent,
 ) -> dict[str, Any]:
-    """Write OUT/<part>/ with the given formats and report.json; returns the report.
+    """Write OUT/<part>/ with the given formats, report.json and its page; returns the report.
 
     All files appear together, in place of those of an earlier export, or none does. ``allow`` is
     for the checks on what was written; what the build allowed stays allowed.
@@ -181,7 +180,16 @@ def export(
         report = make_report(part, checks=checks, files=written, svg_origin=origin)
         with _naming(target, REPORT):
             (folder / REPORT).write_bytes(to_bytes(report))
+        with _naming(target, PAGE):
+            (folder / PAGE).write_bytes(_page(part, report))
     return report
+
+
+def _page(part: Part, report: dict[str, Any]) -> bytes:
+    """The page of what was exported; a check alone does without its modules."""
+    from devcad.report.page import job_page
+
+    return job_page(part, report)
 
 
 def _bounds(recipe: Recipe, sheet: Material | None, thickness: float) -> Bounds | None:

@@ -67,7 +67,7 @@ def prove_pattern(panel: Panel, blank: Blank, *, tolerance: float) -> list[Check
         ),
         _mesh_deviation(panel, tolerance),
         _fold_back(panel, blank),
-        _overlap(panel),
+        overlap(panel),
     ]
 
 
@@ -185,7 +185,8 @@ def _fold_back(panel: Panel, blank: Blank) -> Check:
     )
 
 
-def _overlap(panel: Panel) -> Check:
+def overlap(panel: Panel) -> Check:
+    """The check overlap: that no two places of a panel are cut from one."""
     area = overlap_area(panel.pattern)
     half = 0.5 * (panel.chain.patches[0].domain[0] + panel.chain.patches[-1].domain[1])
     return at_most(

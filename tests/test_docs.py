@@ -36,7 +36,7 @@ def test_the_first_two_commands_set_up_and_run_each_in_one_line() -> None:
     export, tests = blocks(README, "sh")[:2]
     setup = "python3.11 -m venv .venv && .venv/bin/pip install -q"
     assert export == f"{setup} . && .venv/bin/devcad export samples/lampshade.toml\n"
-    assert tests == f"{setup} -e '.[test]' && .venv/bin/python -m pytest\n"
+    assert tests == f"{setup} -e '.[test]' && .venv/bin/python -m pytest -n auto\n"
 
 
 def test_the_readme_lists_every_surface_kind() -> None:
@@ -63,11 +63,12 @@ def test_the_readme_lists_every_format() -> None:
         "step-sheet": "lampshade-sheet.step",
         "traveller": "lampshade-traveller.pdf",
         "cutlist": "lampshade-cutlist.csv",
+        "bends": "lampshade-bends.csv",
         "rolling": "lampshade-rolling.csv",
     }
     formats = {name for name in FORMATS if name not in other}
     named = {f"lampshade.{name}" for name in formats} | set(other.values())
-    assert files == named | {"report.json"}
+    assert files == named | {"report.json", "index.html"}
 
 
 def test_the_readme_lists_every_check() -> None:

@@ -77,7 +77,8 @@ def test_half_the_thickness_gives_the_files_of_today_to_the_byte(tmp_path):
         folder.mkdir()
         report(folder, text + TUBE, "svg", "dxf", "glb")
         files[name] = {p.name: p.read_bytes() for p in (folder / "job").iterdir()}
-        files[name].pop("report.json")
+        files[name].pop("report.json")  # tells the hash of the job, and the page tells all of it
+        files[name].pop("index.html")
     assert files["today"] == files["half"]
 
 

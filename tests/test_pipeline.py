@@ -67,6 +67,10 @@ def lamp(tmp_path: Path) -> Part:
     return devcad.build(job(tmp_path))
 
 
+SVG_ALONE = {"lamp/lamp.svg", "lamp/report.json", "lamp/index.html"}
+"""What an export of SVG alone leaves."""
+
+
 def snapshot(folder: Path) -> dict[str, bytes]:
     """Every file below a folder with its bytes, hidden ones included."""
     files = (path for path in folder.rglob("*") if path.is_file())
@@ -81,7 +85,7 @@ def test_the_report_describes_the_files_beside_it(lamp: Part, tmp_path: Path) ->
     written = tmp_path / "out" / "lamp"
     assert json.loads((written / "report.json").read_bytes()) == report
     listed = {entry["path"]: entry for entry in report["files"]}
-    assert set(listed) == {path.name for path in written.iterdir()} - {"report.json"}
+    assert set(listed) == {path.name for path in written.iterdir()} - {"report.json", "index.html"}
     for name, entry in listed.items():
         data = (written / name).read_bytes()
         assert entry["bytes"] == len(data)
@@ -224,7 +228,7 @@ def test_a_failure_in_a_fresh_place_leaves_no_folder(
 def test_files_of_an_earlier_export_vanish(lamp: Part, tmp_path: Path) -> None:
     devcad.export(lamp, tmp_path / "out", formats=["stl", "svg"])
     devcad.export(lamp, tmp_path / "out", formats=["svg"])
-    assert set(snapshot(tmp_path / "out")) == {"lamp/lamp.svg", "lamp/report.json"}
+    assert set(snapshot(tmp_path / "out")) == SVG_ALONE
 
 
 def test_a_folder_that_devcad_never_wrote_is_left_alone(lamp: Part, tmp_path: Path) -> None:
@@ -266,19 +270,28 @@ def test_a_report_that_is_none_of_ours_lists_nothing(
     assert (foreign / "report.json").read_text() == report
 
 
+def test_a_page_without_a_report_is_somebody_elses(lamp: Part, tmp_path: Path) -> None:
+    foreign = tmp_path / "out" / "lamp"
+    foreign.mkdir(parents=True)
+    (foreign / "index.html").write_text("my homepage")
+    with pytest.raises(FileError, match=r'it holds "index\.html"'):
+        devcad.export(lamp, tmp_path / "out", formats=LIGHT)
+    assert (foreign / "index.html").read_text() == "my homepage"
+
+
 def test_what_a_file_manager_drops_into_a_folder_hinders_no_export(
     lamp: Part, tmp_path: Path
 ) -> None:
     devcad.export(lamp, tmp_path / "out", formats=LIGHT)
     (tmp_path / "out" / "lamp" / ".DS_Store").write_bytes(b"icons")
     devcad.export(lamp, tmp_path / "out", formats=["svg"])
-    assert set(snapshot(tmp_path / "out")) == {"lamp/lamp.svg", "lamp/report.json"}
+    assert set(snapshot(tmp_path / "out")) == SVG_ALONE
 
 
 def test_an_empty_folder_may_stand_where_the_export_goes(lamp: Part, tmp_path: Path) -> None:
     (tmp_path / "out" / "lamp").mkdir(parents=True)
     devcad.export(lamp, tmp_path / "out", formats=["svg"])
-    assert set(snapshot(tmp_path / "out")) == {"lamp/lamp.svg", "lamp/report.json"}
+    assert set(snapshot(tmp_path / "out")) == SVG_ALONE
 
 
 def test_a_file_in_the_folders_place_is_left_alone(lamp: Part, tmp_path: Path) -> None:
@@ -301,7 +314,7 @@ def test_where_folders_cannot_be_exchanged_two_renames_do_it(
     monkeypatch.setattr(folder_module, "_exchanged", lambda one, other: False)
     devcad.export(lamp, tmp_path / "out", formats=["stl"])
     devcad.export(lamp, tmp_path / "out", formats=["svg"])
-    assert set(snapshot(tmp_path / "out")) == {"lamp/lamp.svg", "lamp/report.json"}
+    assert set(snapshot(tmp_path / "out")) == SVG_ALONE
     before = snapshot(tmp_path / "out")
     rename = Path.rename
 
@@ -487,8 +500,8 @@ def test_the_nearer_word_wins() -> None:
     assert near.allow == {"twist", "overlap"}
     assert near.options == replace(Options(), step_degree=3)
     assert resolve("sheet-metal", job_keys).formats == ("svg",)
-    assert resolve("sheet-metal", table()).formats == ("dxf", "step")
-    assert resolve("paper", table()).formats == ("svg", "dxf")
+    assert resolve("sheet-metal", table()).formats == ("dxf", "step", "traveller", "cutlist")
+    assert resolve("paper", table()).formats == ("svg", "dxf", "pdf")
     assert resolve(None, table()).formats == ("step", "stl", "glb", "dxf", "svg")
     assert resolve(None, table()).options == Options()
 

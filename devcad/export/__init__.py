@@ -23,8 +23,8 @@ class Options:
 
     ``step_tolerance`` None means min(tolerance / 10, 1e-4 mm). ``dxf_version``, ``dxf_curves``
     and ``dxf_bend_ticks`` (mm at both ends of a bend line, 0 for the whole line) None mean
-    what the profile has. ``kerf`` (mm) moves the contours of cut patterns before they are
-    written, never the pattern of the part.
+    what the profile has. With ``glb_animate`` glTF files unroll and fold. ``kerf`` (mm) moves
+    the contours of cut patterns before they are written, never the pattern of the part.
     """
 
     step_tolerance: float | None = None
@@ -35,6 +35,7 @@ class Options:
     dxf_curves: str | None = None
     dxf_bend_ticks: float | None = None
     pdf: Pdf = field(default_factory=Pdf)
+    glb_animate: bool = False
     kerf: float = 0.0
 
 
@@ -65,6 +66,7 @@ FORMATS: dict[str, tuple[str, str]] = {
     "traveller": ("devcad.export.traveller", "PDF, a page a panel that goes through the shop"),
     "cutlist": ("devcad.export.cutlist", "CSV, a row a panel: blank, material, quantity, lengths"),
     "rolling": ("devcad.export.rolling", "CSV, the rolls' settings along a panel that is rolled"),
+    "bends": ("devcad.export.bends", "CSV, a row a bend line: place, angle, radii, order"),
     "lorentz-svg": (
         "devcad.export.lorentz",
         "Lorentzian unrolling of a Minkowski surface, a figure that is not for cutting",

@@ -54,7 +54,8 @@ def split(parts: list[Strip], count: int, size: float) -> tuple[list[Strip], int
         return parts, count
     around = count == len(parts)
     for _ in range(ROUNDS):  # a split makes a vertex on the other side, and so may ask for more
-        cuts = [_overlaps(parts, k, size) for k in range(len(parts))]
+        ends = [part.rails(part.ends)[:, :, 0] for part in parts]
+        cuts = [_overlaps(parts, k, ends, size) for k in range(len(parts))]
         if not any(len(c) for c in cuts):
             break
         pieces = [(s, c) for s, cut in zip(parts, cuts, strict=True) for c in _courses(s, cut)]
@@ -66,17 +67,23 @@ def split(parts: list[Strip], count: int, size: float) -> tuple[list[Strip], int
     return parts, count
 
 
-def _overlaps(parts: list[Strip], k: int, size: float) -> Array:
+def _overlaps(parts: list[Strip], k: int, ends: list[Array], size: float) -> Array:
     """The places s strictly within strip k's course where another long edge ends that lies on
-    one of its own from there on, run backwards with the same parameter."""
+    one of its own from there on, run backwards with the same parameter. ``ends`` (2, 2, 3) are
+    those of all strips' long edges."""
     own, found = parts[k], []
     for side in (0, 1):
         if own.tips[side]:
             continue
-        for other in (s for i, s in enumerate(parts) if i != k):
+        looks = own.rails(own.course(_spread(own)))[:, side, 0]
+        longest = float(np.linalg.norm(np.diff(looks, axis=0), axis=1).max())
+        for i, other in ((i, s) for i, s in enumerate(parts) if i != k):
             for b in (b for b in (0, 1) if not other.tips[b]):
                 for end in (0, 1):
-                    place = _foot(own, side, other.rails(other.ends)[end, b, 0], size)
+                    point = ends[i][end, b]
+                    if np.linalg.norm(looks - point, axis=1).min() > 2.0 * longest:
+                        continue  # far from the whole edge
+                    place = _foot(own, side, point, size)
                     if place is not None and _runs_back((own, side), place, (other, b), end, size):
                         found.append(place)
     places = np.sort(np.array(found))

@@ -192,7 +192,7 @@ def _outward(strip: Strip) -> list[Array]:
 
 def _corners(parts: list[Strip], count: int, size: float) -> tuple[Array, Array]:
     """The corners (stations, 2 sides, layers, 3), and for each strip and end what a mitre adds to
-    the skin's offset for a unit of thickness, (strips, 2, 3).
+    the skin's offset for a unit of thickness, (strips, 2, 3): 0 where its pull has that.
 
     At a crease a layer lies at c + d (n1 + n2) / (1 + n1.n2) (design.md, section 7).
     """
@@ -208,7 +208,10 @@ def _corners(parts: list[Strip], count: int, size: float) -> tuple[Array, Array]
             if np.linalg.norm(np.cross(n1, n2)) <= 1e-9:
                 continue
             mitre = (n1 + n2) / (1.0 + n1 @ n2)
-            lifts[k, 1], lifts[after, 0] = mitre - n1, mitre - n2
+            if parts[k].pull is None:
+                lifts[k, 1] = mitre - n1
+            if parts[after].pull is None:
+                lifts[after, 0] = mitre - n2
     corners = np.full((count, *rails[0].shape[1:]), np.nan)
     for k, s in enumerate(parts):
         d = np.array(s.layers)[:, None]

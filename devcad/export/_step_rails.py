@@ -160,10 +160,12 @@ class LongEdge:
     def _runs(self) -> list[tuple[str, Array]]:
         """Neighbouring stretches between breaks that are one line, one arc, or neither."""
         borders = self.strip.course.t
+        # kernels' plain quadrature of a plane goes by its edges: those of a pull are short
+        ends = () if self.strip.pull is None else self.strip.pull.breaks
         runs: list[tuple[str, Array]] = []
         for a, b in pairwise(borders):
             kind = self._kind(np.array([a, b]))
-            if runs and runs[-1][0] == kind:
+            if runs and runs[-1][0] == kind and (kind != "free" or a not in ends):
                 joined = np.append(runs[-1][1], b)
                 if kind == "free" or self._kind(joined) == kind:
                     runs[-1] = (kind, joined)
@@ -179,6 +181,8 @@ class LongEdge:
         if self.skins is not None:
             level = np.ptp(heights(self.skins[0], layers[:, 0]))
             return "arc" if level <= FLOOR * self.size else "free"
+        if self.strip.pull is not None:
+            return self._kind_drawn(layers)
         points = layers.mean(axis=1)
         chord = points[-1] - points[0]
         length = float(np.linalg.norm(chord))
@@ -193,6 +197,18 @@ class LongEdge:
         ]
         centre = None if any(bent) else circle_centre(points, self.size)
         return "free" if centre is None else "arc"
+
+    def _kind_drawn(self, layers: Array) -> str:
+        """What the edges of a plane facet are on layers (n, layers, 3) that are drawn to mitres."""
+        chords = layers[-1] - layers[0]
+        off = np.linalg.norm(np.cross(layers - layers[0], chords), axis=2).max(axis=0)
+        if (off <= FLOOR * self.size * np.linalg.norm(chords, axis=1)).all():
+            return "line"
+        low, high = (circle_centre(x, self.size) for x in layers.swapaxes(0, 1))
+        if low is None or high is None:
+            return "free"
+        n = self.strip.patch.frame(self.strip.ends[:1]).n[0]
+        return "arc" if np.linalg.norm(np.cross(high - low, n)) <= FLOOR * self.size else "free"
 
     def _ends(self, t: Array) -> Array:
         """The corners of a piece over t (2,): the strip's own at its ends, (2, layers, 3)."""

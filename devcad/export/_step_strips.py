@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,9 +19,13 @@ from devcad.geometry import taylor
 from devcad.geometry.classify import Shape, classify
 from devcad.geometry.conic import arc_borders
 from devcad.geometry.fit import FLOOR, Course
+from devcad.geometry.layers import pull_of
 from devcad.geometry.patch import Patch
 from devcad.geometry.taylor import Array
 from devcad.part import Panel
+
+if TYPE_CHECKING:  # only thick sheets with creases have one
+    from devcad.geometry.pull import Pull
 
 FITTED_PARTS = 4  # general-purpose area and volume rules need closed surfaces in quarters
 ANALYTIC_PARTS = 2  # no seam edge, no face of a whole turn
@@ -35,7 +40,8 @@ class Strip:
     """The part of a patch that becomes one face (and its walls), over ``course`` in t.
 
     ``first`` and ``last`` are its stations; ``tips`` tells for each side whether the middle
-    surface ends there in one point, the apex. The patch is number ``number`` of the chain.
+    surface ends there in one point, the apex. The patch is number ``number`` of the chain;
+    ``pull`` draws the layers of a plane with curved edges to its mitres.
     """
 
     patch: Patch
@@ -46,6 +52,7 @@ class Strip:
     last: int
     tips: tuple[bool, bool]
     number: int = 0
+    pull: Pull | None = None
 
     @property
     def ends(self) -> Array:
@@ -72,7 +79,10 @@ class Strip:
         tip = np.where(self.tips, (f.c / np.where(f.a == 0.0, 1.0, f.a))[:, None], 0.0)
         v = v + tip[:, :, None] * d
         along = v[..., None] * f.e[:, None, None]
-        return np.asarray(f.c0[:, None, None] + along + d[:, None] * f.n[:, None, None])
+        rails = f.c0[:, None, None] + along + d[:, None] * f.n[:, None, None]
+        if self.pull is not None:
+            rails += d[:, None] * self.pull.rails(t)[:, :, None]
+        return np.asarray(rails)
 
     def end_slopes(self) -> Array:
         """d/dt of ``rails`` at both ends, from inside, (2 ends, 2 sides, layers, 3).
@@ -98,6 +108,8 @@ class Strip:
             for k, d in enumerate(self.layers):
                 height = v + d * taylor.div(f.c, f.a) if self.tips[side] else v
                 out[:, side, k] = (f.ruling.rail(height) + d * f.n)[1]
+        if self.pull is not None:
+            out += np.array(self.layers)[:, None] * self.pull.slopes(t)[:, :, None]
         return out
 
 
@@ -114,7 +126,8 @@ def strips(panel: Panel) -> tuple[list[Strip], int]:
     size = panel_size(panel)
     for number, (patch, shape) in enumerate(zip(chain.patches, panel.shapes, strict=True)):
         tips = _tips(patch, size)
-        whole = Strip(patch, shape, layers, _plain(patch.segments), 0, 1, tips, number)
+        pull = pull_of(chain, number, layers[-1]) if shape.type == "plane" else None
+        whole = Strip(patch, shape, layers, _plain(patch.segments), 0, 1, tips, number, pull)
         holes = extents(panel.cuts, number)
         for kind, piece in _pieces(whole, around and len(chain.patches) == 1, holes):
             for course in parted(piece, holes):
@@ -209,6 +222,8 @@ def _pieces(whole: Strip, alone: bool, holes: Array) -> list[tuple[Shape, Course
     """The faces of a patch: what each is, and its course in t; where only we cut, clear of the
     ``holes`` (n, 2)."""
     segments = whole.patch.segments
+    if whole.pull is not None:
+        segments = np.unique(np.concatenate([segments, whole.pull.breaks]))
     if whole.shape.analytic:
         cuts = _analytic_cuts(whole, alone, holes)
         return [(whole.shape, _plain(_within(segments, a, b))) for a, b in pairwise(cuts)]

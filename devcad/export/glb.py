@@ -10,10 +10,10 @@ its ``uv_offset_mm`` for several.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,17 +24,26 @@ from devcad.errors import LimitError
 from devcad.export import Options, Written
 from devcad.export.atlas import atlas
 from devcad.export.binary import FLOAT32_STEP, apart, blocks, bounds, demanded, opened, torn
+from devcad.export.glbread import (
+    BIN_CHUNK,
+    CHECK,
+    JSON_CHUNK,
+    MAGIC,
+    VERSION,
+    Json,
+    Stored,
+    accessor,
+    parse,
+)
 from devcad.geometry.taylor import Array
 from devcad.part import Panel, Part
 from devcad.units import METRES_PER_MM
 
+if TYPE_CHECKING:
+    from devcad.export.glbmotion import Skeleton
+
 Floats = NDArray[np.float32]
-Json = dict[str, Any]
 
-CHECK = "glb-readback"
-
-MAGIC, VERSION = 0x46546C67, 2  # "glTF"
-JSON_CHUNK, BIN_CHUNK = 0x4E4F534A, 0x004E4942  # "JSON", "BIN"
 VERTEX_TARGET, INDEX_TARGET = 34962, 34963
 FLOAT = 5126
 INDEX_TYPES = {2: 5123, 4: 5125}  # bytes an index -> component type
@@ -67,10 +76,12 @@ class _Piece:
 def write(part: Part, folder: Path, options: Options) -> list[Written]:
     """One file ``<part>.glb`` in the folder, read back.
 
-    ``max_deviation`` is the mesh's own certified deviation plus the measured rounding to
-    float32, the largest over the panels. ``checks`` holds that rounding for each panel as
-    ``glb-readback``; normals, texture places, indices and bounds that were read are compared
-    too. Triangles that use a vertex twice are left out. Normals are written with unit length.
+    With ``options.glb_animate`` the part folds (glbmotion.py). ``max_deviation`` is the mesh's own
+    certified deviation plus the measured rounding to float32, the largest over the panels, and
+    what the joints add. ``checks`` holds that rounding for each panel as ``glb-readback``, behind
+    them that of the motion; normals, texture places, indices and bounds that were read are
+    compared too. Triangles that use a vertex twice are left out. Normals are written with unit
+    length.
 
     Raises:
         CheckFailed: ``glb-readback``, the file does not hold the mesh.
@@ -81,9 +92,18 @@ def write(part: Part, folder: Path, options: Options) -> list[Written]:
     """
     path = folder / f"{part.name}.glb"
     pieces = _pieces(part)
-    text = json.dumps(_document(part, pieces), separators=(",", ":"), allow_nan=False).encode()
-    text = text.ljust(_padded(len(text)))
+    document = _document(part, pieces)
+    motion = b""
+    bones: list[Skeleton | None] = []
     size = sum(sum(piece.sizes) for piece in pieces)
+    if options.glb_animate:
+        from devcad.export.glbmotion import animated, skeletons  # few jobs ask for it
+
+        bones = skeletons(part)
+        motion = animated(document, bones, size)
+        size += len(motion)
+    text = json.dumps(document, separators=(",", ":"), allow_nan=False).encode()
+    text = text.ljust(_padded(len(text)))
     total = 12 + 8 + len(text) + 8 + size
     if total > MOST_BYTES:
         raise LimitError(
@@ -99,11 +119,13 @@ def write(part: Part, folder: Path, options: Options) -> list[Written]:
         stream.write(np.array([size, BIN_CHUNK], "<u4").tobytes())
         for piece in pieces:
             _write_piece(stream, piece)
-    checks = _read_back(path, pieces, total)
+        stream.write(motion)
+    checks = _read_back(path, pieces, total, bones)
     deviation = max(
         piece.panel.mesh.deviation + check.value
-        for piece, check in zip(pieces, checks, strict=True)
+        for piece, check in zip(pieces, checks, strict=False)
     )
+    deviation += max((check.value for check in checks[len(pieces) :]), default=0.0)
     return [Written(path, "glb", float(deviation), checks)]
 
 
@@ -275,34 +297,20 @@ def _bounds(vertices: Array) -> Json:
     return {"min": ends.min(axis=0).tolist(), "max": ends.max(axis=0).tolist()}
 
 
-@dataclass(frozen=True, slots=True)
-class _Stored:
-    """An accessor's numbers in the open file, (count, width) from ``offset`` on."""
-
-    stream: BinaryIO
-    offset: int
-    kind: np.dtype[Any]
-    count: int
-    width: int
-
-    def rows(self, rows: slice) -> NDArray[Any]:
-        """Some of its rows, read now."""
-        size = self.kind.itemsize * self.width
-        self.stream.seek(self.offset + rows.start * size)
-        numbers = np.fromfile(self.stream, self.kind, (rows.stop - rows.start) * self.width)
-        return numbers.reshape(-1, self.width)
-
-
-def _read_back(path: Path, pieces: list[_Piece], total: int) -> tuple[Check, ...]:
-    """Parse the file by its own tables and compare it with the meshes."""
-    moved = []
+def _read_back(
+    path: Path, pieces: list[_Piece], total: int, bones: Sequence[Skeleton | None]
+) -> tuple[Check, ...]:
+    """Parse the file by its own tables and compare it with the meshes, then its motion with theirs:
+    a check for every panel, then one for every panel that moves."""
+    moved: list[Check] = []
+    folded: list[Check] = []
     with opened(path, "rb") as stream:
-        document, start = _parse(stream, path, total)
-        for node, piece in zip(document["nodes"], pieces, strict=True):
+        document, start = parse(stream, path, total)
+        for node, piece in zip(document["nodes"], pieces, strict=False):  # joints come behind
             (primitive,) = document["meshes"][node["mesh"]]["primitives"]
             named = primitive["attributes"] | {"indices": primitive["indices"]}
             stored = {
-                name: _stored(stream, start, document, index) for name, index in named.items()
+                name: accessor(stream, start, document, index) for name, index in named.items()
             }
             told = document["accessors"][named["POSITION"]]
             if not _holds(stored, told, piece):
@@ -310,37 +318,16 @@ def _read_back(path: Path, pieces: list[_Piece], total: int) -> tuple[Check, ...
             size = max(map(abs, told["min"] + told["max"])) / METRES_PER_MM
             checks = _checks(piece, size, document["extras"]["mm_per_uv"], stored)
             moved.append(demanded(checks, path)[0])
-    return tuple(moved)
+        for number, skeleton in enumerate(bones):
+            if skeleton is not None:
+                from devcad.export.glbmotion import folds
+
+                check = folds(stream, start, document, number, skeleton)
+                folded += demanded([check], path)
+    return (*moved, *folded)
 
 
-def _parse(stream: BinaryIO, path: Path, total: int) -> tuple[Json, int]:
-    """The JSON of a GLB file whose lengths agree with one another; where its numbers start."""
-    actual = path.stat().st_size
-    if actual != total:
-        raise torn(CHECK, path, f"{actual} bytes, not {total}")
-    *head, told, size, kind = np.fromfile(stream, "<u4", 5).tolist()
-    if (*head, told, kind) != (MAGIC, VERSION, total, JSON_CHUNK) or 28 + size > total:
-        raise torn(CHECK, path, "damaged header")
-    try:
-        document: Json = json.loads(stream.read(size))
-    except ValueError:
-        raise torn(CHECK, path, "damaged JSON") from None
-    length, binary = np.fromfile(stream, "<u4", 2).tolist()
-    if (28 + size + length, binary) != (total, BIN_CHUNK):
-        raise torn(CHECK, path, "damaged chunk header")
-    return document, 28 + size
-
-
-def _stored(stream: BinaryIO, start: int, document: Json, index: int) -> _Stored:
-    """Where an accessor's numbers are."""
-    accessor = document["accessors"][index]
-    view = document["bufferViews"][accessor["bufferView"]]
-    kind = np.dtype({5126: "<f4", 5123: "<u2", 5125: "<u4"}[accessor["componentType"]])
-    width = {"SCALAR": 1, "VEC2": 2, "VEC3": 3}[accessor["type"]]
-    return _Stored(stream, start + view["byteOffset"], kind, accessor["count"], width)
-
-
-def _holds(stored: dict[str, _Stored], told: Json, piece: _Piece) -> bool:
+def _holds(stored: dict[str, Stored], told: Json, piece: _Piece) -> bool:
     """Whether the indices are the mesh's and the bounds told those of the positions."""
     indices, position = stored["indices"], stored["POSITION"]
     if (indices.count, position.count) != (piece.indices.size, len(piece.panel.mesh.vertices)):
@@ -351,9 +338,7 @@ def _holds(stored: dict[str, _Stored], told: Json, piece: _Piece) -> bool:
     )
 
 
-def _checks(
-    piece: _Piece, size: float, mm_per_uv: float, stored: dict[str, _Stored]
-) -> list[Check]:
+def _checks(piece: _Piece, size: float, mm_per_uv: float, stored: dict[str, Stored]) -> list[Check]:
     """Distances between what was read and the mesh, each against what float32 allows.
 
     ``size`` is the largest coordinate in mm.

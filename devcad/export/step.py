@@ -24,6 +24,7 @@ from devcad.export._step_seams import SEWN, coinciding, shared
 from devcad.export._step_shape import shape_of
 from devcad.export._step_strips import panel_size
 from devcad.geometry.fit import FLOOR, TWIST_LIMIT
+from devcad.geometry.layers import drawn
 from devcad.part import Panel, Part
 
 SHARE = 0.1  # of the job's tolerance
@@ -54,8 +55,8 @@ def written(part: Part, path: Path, format: str, options: Options) -> Written:
     size = max(panel_size(p) for p in part.panels)
     plans, checks = bodies(part, tolerance, options.step_degree)
     shapes = [(b.name, shape_of(b)) for b in plans]
-    cut = any(panel.cuts for panel in part.panels)
-    write_step(path, part.name, shapes, part.colour, options.step_schema, sparing=cut)
+    many = any(p.cuts or p.bends or drawn(p.chain, p.thickness) for p in part.panels)
+    write_step(path, part.name, shapes, part.colour, options.step_schema, sparing=many)
     proofs = prove(plans, read_step(path), size)
     for panel, plan, proof in zip(part.panels, plans, proofs, strict=True):
         checks += _checks(panel, plan, proof, tolerance)

@@ -1,7 +1,7 @@
 """The traveller: one PDF a job, one A4 page a panel, that goes through the shop with the part.
 
-A picture to scale with overall dimensions, the blank, material and lengths, the bends, the checks
-with their limits, the files with their hashes, and boxes to sign.
+A picture to scale with overall dimensions, the blank, material and lengths, the bends, the stitches
+and edges, the checks with their limits, the files with their hashes, and boxes to sign.
 """
 
 from __future__ import annotations
@@ -40,11 +40,13 @@ WIDE, HIGH = PAPERS["A4"]
 EDGE = 12.0  # mm, the margin of the page
 FINEST = 0.01  # mm; a picture need not be nearer
 SMALLEST = 55.0  # mm, the least height of the picture
-MOST_BENDS = 24
-MOST_FILES = 12
-MOST_CHECKS = 28
+MOST_BENDS, MOST_STITCHES, MOST_NOTES, MOST_CHECKS, MOST_FILES = 24, 12, 4, 28, 12
+"""Rows of the tables, at most; all shrink by :data:`SHRUNK` where the page is full."""
+SHRUNK = (1.0, 0.75, 0.5, 0.34, 0.2)
 FOOT = 30.0  # mm for the boxes to sign and the last line
 GAP = 3.0  # mm between the blocks
+STITCHES = ("edge", "mate", "holes", "pitch", "hole", "inset")
+EDGES = ("edge", "finish", "allowance", "corner")
 
 
 def write(part: Part, folder: Path, options: Options) -> list[Written]:
@@ -82,9 +84,12 @@ def _page(part: Part, number: int, files: Sequence[tuple[str, str]]) -> tuple[Pa
     left, right, top = EDGE, WIDE - EDGE, HIGH - EDGE
     items: list[Item] = list(heading(_names(part, panel), (left, top - 16.0, right, top)))
     top -= 16.0 + GAP
-    blocks = [block for block in _tables(part, panel, files) if block.rows]
-    below = sum(height(block) + GAP for block in blocks) + FOOT
-    room = max(SMALLEST, top - EDGE - below)
+    for share in SHRUNK:
+        blocks = [block for block in _tables(part, panel, files, share) if block.rows]
+        room = top - EDGE - FOOT - sum(height(block) + GAP for block in blocks)
+        if room >= SMALLEST:
+            break
+    room = max(SMALLEST, room)
     groups = _picture(panel)
     marks = [0.5 * (bend.start + bend.end) for bend in _bend_lines(panel)[:MOST_BENDS]]
     items += picture(groups, _box(panel), (left, top - room, right, top), marks)
@@ -124,19 +129,27 @@ def _names(part: Part, panel: Panel) -> list[str]:
     return [name, *(word for word in words if word)]
 
 
-def _tables(part: Part, panel: Panel, files: Sequence[tuple[str, str]]) -> list[Table]:
-    """The blocks below the picture."""
-    checks = [check for check in part.checks if check.panel in ("", panel.name)]
+def _tables(
+    part: Part, panel: Panel, files: Sequence[tuple[str, str]], share: float
+) -> list[Table]:
+    """The blocks below the picture, with that share of the rows that they may have at most."""
+
+    def table(
+        title: str, header: tuple[str, ...], rows: list[tuple[str, ...]], most: int, where: str
+    ) -> Table:
+        return Table(title, header, _cut(rows, max(2, int(share * most)), where), 2)
+
+    checks = [_check(check) for check in part.checks if check.panel in ("", panel.name)]
+    notes: list[tuple[str, ...]] = [(str(note),) for note in panel.facts.get("notes") or ()]
+    report = "report.json"
     return [
         Table("blank", ("", ""), _data(part, panel), 2),
-        bends(panel),
-        Table(
-            "checks",
-            ("check", "value", "limit", ""),
-            _cut([_check(check) for check in checks], MOST_CHECKS, "report.json"),
-            2,
-        ),
-        Table("files", ("file", "sha256"), _cut(list(files), MOST_FILES, "report.json"), 2),
+        table("bends", *_bends(panel), MOST_BENDS, "the drawing"),
+        table("stitches", STITCHES, _stitches(panel), MOST_STITCHES, report),
+        Table("edges", EDGES, _edges(panel), 2),
+        Table("notes", ("",), _cut(notes, MOST_NOTES, report), 1),
+        table("checks", ("check", "value", "limit", ""), checks, MOST_CHECKS, report),
+        table("files", ("file", "sha256"), list(files), MOST_FILES, report),
     ]
 
 
@@ -156,7 +169,7 @@ def _data(part: Part, panel: Panel) -> list[tuple[str, ...]]:
         ("stitch holes", f"{stitches}" if stitches else ""),
         ("smallest radius", _amount(facts.get("min_radius"), "mm, middle", 2)),
         ("neutral fibre K", _amount(facts.get("k_neutral"), facts.get("k_source") or "", 3)),
-        ("grain", "" if part.grain is None else f"{math.degrees(part.grain):g} deg from +x"),
+        ("grain", _grain(part.grain)),
         ("finish", f"on the {part.finish}" if part.finish else ""),
     ]
     return [row for row in rows if row[1]]
@@ -174,20 +187,62 @@ def _amount(value: float | None, unit: str, digits: int) -> str:
     return "" if value is None else f"{value:.{digits}f} {unit}".rstrip()
 
 
-def bends(panel: Panel) -> Table:
-    """The table of the bends that the pattern shows, in its order."""
-    rows: list[tuple[str, ...]] = [
-        (
+def _grain(grain: float | None) -> str:
+    """The grain's direction, and how the piece may be turned on the sheet: as the nest does it."""
+    return "" if grain is None else f"{math.degrees(grain):g} deg from +x; may turn by 180"
+
+
+def _bends(panel: Panel) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    """Header and rows of the bends that the pattern shows, in its order; with the inside radius at
+    both ends and the place in the order of bending where the bends have them."""
+    lines = _bend_lines(panel)
+    header: tuple[str, ...] = ("bend", "from x, y", "to x, y", "deg", "")
+    radii, ordered = (
+        any(getattr(a, key) is not None for a in lines) for key in ("radius", "order")
+    )
+    header += ("radius",) * radii + ("order",) * ordered
+    digits = 1 if radii else 2
+    rows = []
+    for number, line in enumerate(lines, start=1):
+        row = (
             f"{number}",
-            f"{line.start[0]:.2f}, {line.start[1]:.2f}",
-            f"{line.end[0]:.2f}, {line.end[1]:.2f}",
+            *(f"{at[0]:.{digits}f}, {at[1]:.{digits}f}" for at in (line.start, line.end)),
             f"{math.degrees(abs(line.angle)):.2f}",
             "up" if line.layer == "BEND_UP" else "down",
         )
-        for number, line in enumerate(_bend_lines(panel), start=1)
+        row += (_radius(line),) * radii
+        row += ("" if line.order is None else f"{line.order}",) * ordered
+        rows.append(row)
+    return header, rows
+
+
+def _radius(line: Line) -> str:
+    """The inside radii of a bend at its start and its end, one number where they are one."""
+    words = [f"{radius:.1f}" for radius in line.radius or ()]
+    return " / ".join(dict.fromkeys(words))
+
+
+def _stitches(panel: Panel) -> list[tuple[str, ...]]:
+    """How each edge of a panel is sewn to its mate: holes, their real pitch, form and inset."""
+    return [
+        (
+            each["edge"],
+            each["mate"],
+            f"{each['count']}",
+            _amount(each["pitch"], "", 3),
+            each["hole"],
+            f"{each['inset']:g}",
+        )
+        for each in panel.facts.get("stitches") or ()
     ]
-    header = ("bend", "from x, y", "to x, y", "deg", "")
-    return Table("bends", header, _cut(rows, MOST_BENDS, "the drawing"), 2)
+
+
+def _edges(panel: Panel) -> list[tuple[str, ...]]:
+    """What is done with the edges of a panel."""
+    return [
+        (name, each["finish"], f"{each['allowance']:g}", each["corner"])
+        for name, each in (panel.facts.get("edges") or {}).items()
+    ]
 
 
 def _bend_lines(panel: Panel) -> list[Line]:
@@ -205,8 +260,9 @@ def _cut(rows: list[tuple[str, ...]], most: int, where: str) -> list[tuple[str, 
     """The rows, or the first of them and how many more stand elsewhere."""
     if len(rows) <= most:
         return rows
-    rest = len(rows) - most + 1
-    return [*rows[: most - 1], (f"+{rest}", f"in {where}", *[""] * (len(rows[0]) - 2))]
+    rest, columns = len(rows) - most + 1, len(rows[0])
+    last = (f"+{rest}", f"in {where}", *[""] * (columns - 2))
+    return [*rows[: most - 1], last if columns > 1 else (" ".join(last),)]
 
 
 def _files(part: Part, folder: Path) -> list[tuple[str, str]]:

@@ -42,6 +42,17 @@ def bent(blank: Blank, bend: float) -> Chain:
     )
 
 
+def neutral(blank: Blank) -> Chain:
+    """The smooth surface that is isometric to the blank: bent as the part, and nowhere longer."""
+    chain = blank.middle
+    first = chain.patches[0].frame([chain.patches[0].domain[0]])
+    whole = fold_chain(blank.developments, chain, first, 1.0)
+    every = zip(chain.patches, whole, blank.fibres, strict=True)
+    return replace(
+        chain, patches=tuple(_bent(patch, each, fibre, 1.0) for patch, each, fibre in every)
+    )
+
+
 def _bent(patch: Patch, folded: Folded, rest: Fibre | None, bend: float) -> Patch:
     """The patch whose frame starts from the folded one and obeys the frame's own equations; by
     ``rest`` it is shorter than the patch was."""

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from devcad.errors import GeometryError
 from devcad.flatten.drawings import kept_inside
+from devcad.flatten.green import enclosed_area
 from devcad.flatten.images import track_images, within
 from devcad.flatten.pattern import CUTOUT, Edge, Unrolled, length_bound
 from devcad.geometry.cells import Run, Stretch, whole
@@ -24,6 +25,8 @@ SIDES = ("start", "top", "end", "base")
 """The names of a border's sides, counterclockwise."""
 COLLAPSED = 1e-12
 """An edge shorter than this share of the pattern is a point: an apex."""
+ONE_LINE = 1e-9
+"""Rulings whose ends are no further apart than this share of them are one line."""
 KINK = 1e-6
 """An edge that turns by more than this at one point, in radians, has a corner there."""
 
@@ -73,6 +76,25 @@ def cut_border(
     for part in around:
         edges += next(crossing) if isinstance(part, Run) else _stretch_edges(part, pairs)
     return _without_points(edges), tuple(cut[len(runs) :])
+
+
+def healed(
+    outline: tuple[Edge, ...], holes: tuple[tuple[Edge, ...], ...]
+) -> tuple[tuple[Edge, ...], tuple[tuple[Edge, ...], ...]]:
+    """An outline and its holes without a first and last ruling that are one line.
+
+    A flat disc is cut round and not along a radius; the other rim of a ring becomes a hole.
+    """
+    names = [edge.name for edge in outline]
+    if names[0] != SIDES[0] or names.count(SIDES[0]) != 1 or names.count(SIDES[2]) != 1:
+        return outline, holes
+    k = names.index(SIDES[2])
+    start, end = (edge.curve(edge.u[[0, -1]])[0] for edge in (outline[0], outline[k]))
+    size = float(np.hypot(*np.ptp(np.concatenate([start, end]), axis=0)))
+    if np.abs(start - end[::-1]).max() > ONE_LINE * size:
+        return outline, holes
+    rims = sorted(filter(None, (outline[1:k], outline[k + 1 :])), key=enclosed_area)
+    return rims[-1], (*holes, *rims[:-1])
 
 
 def _run_edges(runs: Sequence[Run], pairs: Pairs, cuts: Sequence[Cut]) -> list[tuple[Edge, ...]]:

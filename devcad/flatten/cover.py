@@ -9,7 +9,7 @@ through all copies: cell k lies between the rulings k and k + 1.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,7 +65,9 @@ class Cover:
     which t they lie. ``turn`` and ``shift`` are the motion from one copy to the next, None on an
     open sheet. ``rulings`` are the borders of one copy's cells, on an open sheet the last one
     too. ``boxes`` (p, 2, 2) hold the patches' images and ``box`` (2, 2) all of them. ``corners``
-    (k,) tell where a smooth line of the pattern has a corner in space, at the start of a cell."""
+    (k,) tell where a smooth line of the pattern has a corner in space, at the start of a cell.
+    ``only`` (owners, 2), if given, are the first and the last cell in which each owner's points
+    are looked for."""
 
     chain: Chain
     developments: tuple[Development, ...]
@@ -79,6 +81,7 @@ class Cover:
     boxes: Array
     box: Array
     corners: NDArray[np.bool_]
+    only: Index | None = None
 
     @property
     def size(self) -> float:
@@ -123,6 +126,20 @@ class Cover:
                 out.append((copy, every[hit]))
         return out
 
+    def restricted(self, patches: Sequence[tuple[int, int] | None]) -> Cover:
+        """The cover in which each owner's points lie on its ``patches`` only, from the first to the
+        last; None leaves all."""
+        if not any(patches):
+            return self
+        most = np.iinfo(np.intp).max
+        only = np.array([(-most, most)] * len(patches))
+        for owner, pair in enumerate(patches):
+            for end, number in enumerate(pair or ()):
+                copy, patch = divmod(number, len(self.lines))
+                own = np.flatnonzero(self.patch == patch)
+                only[owner, end] = copy * self.count + own[-1 if end else 0]
+        return replace(self, only=only)
+
     def borders(self, copy: int) -> tuple[Rulings, Index]:
         """The borders of a copy's cells with their numbers."""
         rotation, shift = self.motion(copy)
@@ -135,19 +152,34 @@ class Cover:
     def find(self, points: Array, owner: Index, copies: Sequence[tuple[int, Index]]) -> Found:
         """The cells in which points (n, 2) lie, ``owner`` (n,) saying whose they are: looked for
         in the ``copies`` of their owners. Points on a border are found on both sides of it."""
-        parts = []
+        parts: list[tuple[Index, Index, Array, Array, Array]] = []
         for copy, owners in copies:
             rows = np.flatnonzero(np.isin(owner, owners))
             rotation, shift = self.motion(copy)
             here = (points[rows] - shift) @ rotation
             for number in range(len(self.lines)):
                 low, high = self.boxes[number]
-                close = np.flatnonzero(np.all((here >= low) & (here <= high), axis=1))
+                near = np.all((here >= low) & (here <= high), axis=1)
+                close = np.flatnonzero(near & self._allowed(owner[rows], copy, number))
+                if not len(close) and parts:
+                    continue
                 row, cell, t, v, room = self._on_patch(number, here[close])
                 parts.append((rows[close][row], cell + copy * self.count, t, v, room))
         columns = [np.concatenate(column) for column in zip(*parts, strict=True)]
+        if self.only is not None:
+            first, last = self.only[owner[columns[0]]].T
+            kept = (columns[1] >= first) & (columns[1] <= last)
+            columns = [column[kept] for column in columns]
         order = np.argsort(columns[0], kind="stable")
         return Found(*(column[order] for column in columns))
+
+    def _allowed(self, owner: Index, copy: int, number: int) -> NDArray[np.bool_]:
+        """Whether owners (n,) have cells on a patch of a copy to be looked for, (n,)."""
+        if self.only is None:
+            return np.ones(len(owner), dtype=bool)
+        own = copy * self.count + np.flatnonzero(self.patch == number)
+        first, last = self.only[owner].T
+        return np.asarray((first <= own[-1]) & (last >= own[0]))
 
     def solve(self, points: Array, cell: Index, fixed: Array) -> tuple[Array, Array]:
         """t and v (n,) of points (n, 2) in known cells (n,); t is ``fixed`` where that is a

@@ -107,7 +107,8 @@ def cutouts(flat: Sequence[Cutout], sheet: Cover) -> list[Laid]:
     lines = _placed(lines, [cutout.placing for cutout in flat], sheet)
     notch = np.array([cutout.notch for cutout in flat])
     names = [cutout.place for cutout in flat]
-    stretches, runs, whole = _runs(lines, sheet, names, notch, "cutout-crosses-edge")
+    near = sheet.restricted([cutout.patches for cutout in flat])
+    stretches, runs, whole = _runs(lines, near, names, notch, "cutout-crosses-edge")
     return [
         Laid(
             names[k],

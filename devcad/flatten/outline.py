@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from devcad.flatten.border import Pairs, border, cut_border
+from devcad.flatten.border import Pairs, border, cut_border, healed
 from devcad.flatten.clipping import sheet
 from devcad.flatten.drawings import draw, not_repeated
 from devcad.flatten.edges import DROPPED
@@ -33,6 +34,7 @@ def lay_out(
     drawings: tuple[Drawing, ...] = (),
     cuts: tuple[Cut, ...] = (),
     bending: Sequence[Patch] = (),
+    bends: Sequence[Line] | None = None,
 ) -> Pattern:
     """The pattern of a chain, its front towards the viewer, counterclockwise.
 
@@ -40,18 +42,24 @@ def lay_out(
     found to rounding. Reference lines: joints (rulings where smooth, bends where creased) and
     certified rulings about every 15 degrees of bending. Drawings are those on the sheet, without
     what is a point. Both end where a cut begins. A chain that is the pattern itself, of plane
-    patches, does not bend: the patches to which it will be tell by their ``bending``.
+    patches, does not bend: the patches to which it will be tell by their ``bending``. With
+    ``bends`` of a press brake these are the bend lines, in their order, and no ruling is one.
 
     Raises:
         GeometryError: the cuts part the panel, or cross each other.
     """
     pairs = list(zip(chain.patches, developments, strict=True))
-    outline, holes = cut_border(chain, pairs, cuts) if cuts else (border(pairs), ())
+    outline, holes = healed(*(cut_border(chain, pairs, cuts) if cuts else (border(pairs), ())))
     box = bounds(outline)
     least = DROPPED * float(np.hypot(box[2] - box[0], box[3] - box[1]))
     drawn = [edge for each in drawings for edge in draw(each, *pairs[each.patch])]
     kept = tuple(edge for edge in drawn if length_bound(edge) > least)
-    lines = not_repeated(reference_lines(chain, pairs, rulings, bending), kept, least)
+    if bends is None:
+        lines = reference_lines(chain, pairs, rulings, bending)
+    else:
+        joints = _joints(chain, pairs, bending or chain.patches)
+        lines = (*(line for line in joints if not line.angle), *bends)
+    lines = not_repeated(lines, kept, least)
     if cuts:
         left = sheet(outline, holes)
         lines = tuple(part for line in lines for part in left.line(line))
@@ -63,8 +71,10 @@ def reference_lines(
     chain: Chain, pairs: Pairs, rulings: tuple[Array, ...], bending: Sequence[Patch] = ()
 ) -> tuple[Line, ...]:
     """Joints (rulings where smooth, bends where creased), and of the certified ``rulings`` about
-    one for every 15 degrees of ``bending``, that of the chain's own patches by default."""
-    return (*_joints(chain, pairs), *_references(pairs, rulings, bending or chain.patches))
+    one for every 15 degrees of ``bending``, that of the chain's own patches by default. A patch
+    that is one bend has the line in its middle and no rulings."""
+    bent = bending or chain.patches
+    return (*_joints(chain, pairs, bent), *_references(pairs, rulings, bent))
 
 
 def sheet_area(chain: Chain, cuts: tuple[Cut, ...]) -> float:
@@ -125,22 +135,39 @@ def _ruling_lines(
     return [Line(layer, start, end, angle) for start, end in zip(starts, ends, strict=True)]
 
 
-def _joints(chain: Chain, pairs: Pairs) -> list[Line]:
-    """The joints between patches as lines: rulings where smooth, else bends up or down."""
+def _joints(chain: Chain, pairs: Pairs, bent: Sequence[Patch]) -> list[Line]:
+    """The joints between patches and the patches that are one bend as lines, in their order:
+    rulings where smooth, bends up or down where creased or bent."""
     out = []
-    for (patch, unrolled), joint in zip(pairs[1:], chain.joints, strict=True):
-        bend = "BEND_UP" if joint.angle > 0.0 else "BEND_DOWN"
-        layer, angle = ("RULING", 0.0) if joint.smooth else (bend, joint.angle)
-        at = np.array(patch.domain[:1])
-        out += _ruling_lines(layer, patch, unrolled, at, angle)
+    for k, ((patch, unrolled), turning) in enumerate(zip(pairs, bent, strict=True)):
+        radius = turning.inside_radius
+        if k and radius is None and bent[k - 1].inside_radius is None:
+            joint = chain.joints[k - 1]
+            layer, angle = ("RULING", 0.0) if joint.smooth else (_way(joint.angle), joint.angle)
+            out += _ruling_lines(layer, patch, unrolled, np.array(patch.domain[:1]), angle)
+        if radius is not None:
+            angle, middle = _turned(turning), np.array([0.5 * (patch.domain[0] + patch.domain[1])])
+            lines = _ruling_lines(_way(angle), patch, unrolled, middle, angle)
+            out += [replace(line, radius=(radius, radius)) for line in lines]
     return out
+
+
+def _way(angle: float) -> str:
+    return "BEND_UP" if angle > 0.0 else "BEND_DOWN"
+
+
+def _turned(patch: Patch) -> float:
+    """By what angle in radians a patch that is one bend turns the normal, to the front positive."""
+    low, high = patch.domain
+    frame = patch.frame([np.nextafter(low, high), np.nextafter(high, low)])
+    return float(np.arctan2(np.cross(frame.n[0], frame.n[1]) @ frame.e[0], frame.n[0] @ frame.n[1]))
 
 
 def _references(pairs: Pairs, rulings: tuple[Array, ...], bent: Sequence[Patch]) -> list[Line]:
     """Certified rulings to bend along, one for every 15 degrees of bending."""
     out = []
     for (patch, unrolled), t, turning in zip(pairs, rulings, bent, strict=True):
-        if len(t) < 3:
+        if len(t) < 3 or turning.inside_radius is not None:
             continue
         rate = np.abs(turning.frame(0.5 * (t[1:] + t[:-1])).c)
         step = np.floor(np.cumsum(rate * np.diff(t))[:-1] / LINE_EVERY + 1e-9)

@@ -36,13 +36,16 @@ class Line:
     """A straight line on the pattern from ``start`` to ``end`` (2,): a ruling or a bend.
 
     ``layer`` is RULING, BEND_UP, BEND_DOWN; ``angle`` is a bend's angle in radians,
-    positive towards the front, 0 for a ruling.
+    positive towards the front, 0 for a ruling. ``radius`` are the inside radii in mm at both ends
+    of the whole bend, where there are any, ``order`` is its place in the order of bending.
     """
 
     layer: str
     start: Array
     end: Array
     angle: float = 0.0
+    radius: tuple[float, float] | None = None
+    order: int | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -61,6 +61,16 @@ class Chain:
         """Whether the chain is a tube without a gap."""
         return self.closing is not None
 
+    @property
+    def around(self) -> tuple[Joint, ...]:
+        """The joints after the patches in order, last that from the last patch to the first."""
+        return self.joints if self.closing is None else (*self.joints, self.closing)
+
+    @property
+    def creased(self) -> bool:
+        """Whether a joint is a crease."""
+        return not all(joint.smooth for joint in self.around)
+
 
 def link(patches: tuple[Patch, ...], *, base_closed: bool, tolerance: float) -> Chain:
     """The chain of patches that follow one another, closed where the last meets the first.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,6 +11,9 @@ from devcad.geometry.chain import Chain, Joint
 from devcad.geometry.classify import EXACT
 from devcad.geometry.patch import Frame, Patch
 from devcad.geometry.taylor import Array
+
+if TYPE_CHECKING:  # only thick sheets with creases ask for it
+    from devcad.geometry.pull import Pull
 
 BAND, POWER = 8.0, 6.0
 """The reach of a mitre's pull on the points beside it, in its own shift, and how it fades: the
@@ -24,13 +28,21 @@ def layer_ends(chain: Chain, number: int, frame: Frame, distance: float) -> tupl
 
     - at an apex (q + v a = 0 at an end), where the layer ends by itself at q + v a = distance c;
     - on a creased joint of a thick sheet, where both sides meet on the mitre: moved by
-      distance * (n1 + n2) / (1 + n1.n2), at right angles to the ruling.
+      distance * (n1 + n2) / (1 + n1.n2), at right angles to the ruling; between two creases by
+      what :class:`devcad.geometry.pull.Pull` says.
     """
     offset = distance * frame.n
-    if distance:
-        for row, joint in zip((0, -1), _joints_of(chain, number), strict=True):
-            offset[row] = distance * mitre(frame, row, joint)
-    return _rail(frame, frame.v_from, offset, distance), _rail(frame, frame.v_to, offset, distance)
+    low = high = offset
+    joints = _joints_of(chain, number)
+    if distance and _creased(joints):
+        pull = pull_of(chain, number, distance)
+        if pull is not None or len(frame.t) > 2:
+            pull = pull or _straight_pull(chain, number)
+            shifts = distance * pull.rails(frame.t)
+            low, high = offset + shifts[:, 0], offset + shifts[:, 1]
+        for row, joint in zip((0, -1), joints, strict=True):
+            low[row] = high[row] = distance * mitre(frame, row, joint)
+    return _rail(frame, frame.v_from, low, distance), _rail(frame, frame.v_to, high, distance)
 
 
 def layer_points(chain: Chain, number: int, t: Array, v: Array, distance: float) -> Array:
@@ -43,15 +55,19 @@ def layer_points(chain: Chain, number: int, t: Array, v: Array, distance: float)
     shift (less, and a lower power, where the next crease is nearer). The shift depends on x alone
     and is odd in the distance, so that what lies between two layers is area x thickness still;
     both sides of a crease agree to rounding; and a spline of degree 5 follows it in few spans.
+    Facets with curved edges have one pull for edges and cuts (:class:`devcad.geometry.pull.Pull`).
     """
     patch = chain.patches[number]
     frame = patch.frame(t)
     points = frame.c0 + v[:, None] * frame.e
     out = points + distance * frame.n
     joints = _joints_of(chain, number)
-    if not distance or all(joint is None or joint.smooth for joint in joints):
+    if not distance or not _creased(joints):
         return np.asarray(out)
-    ends = patch.frame([np.nextafter(x, y) for x, y in (patch.domain, patch.domain[::-1])])
+    pull = pull_of(chain, number, distance)
+    if pull is not None:
+        return np.asarray(out + distance * pull(t, v))
+    ends = _end_frames(patch)
     rails = [ends.c0 + x[:, None] * ends.e for x in (ends.v_from, ends.v_to)]
     for row, joint in enumerate(joints):
         if joint is None or joint.smooth:
@@ -116,10 +132,73 @@ def layer_gaps(chain: Chain, layers: tuple[float, ...]) -> list[float]:
 
 def straight_sided(patch: Patch) -> bool:
     """Whether both rails are straight lines within 1e-9 of their length."""
+    return all(straight_rails(patch))
+
+
+def straight_rails(patch: Patch) -> tuple[bool, bool]:
+    """Whether each rail is a straight line within 1e-9 of its length."""
     jet = patch.jet(np.linspace(*patch.domain, 9), 0)
-    for rail in (jet.rail(jet.v_from)[0], jet.rail(jet.v_to)[0]):
-        chord = rail[-1] - rail[0]
-        away = np.linalg.norm(np.cross(rail - rail[0], chord), axis=1)
-        if away.max() > EXACT * float(chord @ chord):
-            return False
-    return True
+    low, high = (_straight(jet.rail(v)[0]) for v in (jet.v_from, jet.v_to))
+    return low, high
+
+
+def _straight(rail: Array) -> bool:
+    chord = rail[-1] - rail[0]
+    away = np.linalg.norm(np.cross(rail - rail[0], chord), axis=1)
+    return bool(away.max() <= EXACT * float(chord @ chord))
+
+
+def pull_of(chain: Chain, number: int, distance: float) -> Pull | None:
+    """How the layers at +-``distance`` of patch ``number`` are drawn to its mitres, None where it
+    has none or only straight sides, which run from mitre to mitre."""
+    joints = _joints_of(chain, number)
+    patch = chain.patches[number]
+    if not distance or not _creased(joints):
+        return None
+    straight = straight_rails(patch)
+    if all(straight):
+        return None
+    from devcad.geometry.pull import pulled
+
+    return pulled(patch, _shifts(patch, joints), straight, abs(distance))
+
+
+def drawn(chain: Chain, distance: float) -> bool:
+    """Whether the layers at +-``distance`` have curved edges that are drawn to mitres."""
+    return any(pull_of(chain, k, distance) is not None for k in range(len(chain.patches)))
+
+
+def layer_width(chain: Chain, number: int, distance: float) -> tuple[float, float, float]:
+    """At the narrowest place of a patch beside creases, compared with what mitres take there off
+    its layers at +-``distance``: its width, what is taken, in mm, and t; (inf, 0, t) without one.
+
+    Taken is as much as the width, or more, where a layer is turned inside out.
+    """
+    joints = _joints_of(chain, number)
+    if not distance or not _creased(joints):
+        return np.inf, 0.0, float(chain.patches[number].domain[0])
+    from devcad.geometry.pull import narrowest
+
+    return narrowest(pull_of(chain, number, distance) or _straight_pull(chain, number), distance)
+
+
+def _straight_pull(chain: Chain, number: int) -> Pull:
+    from devcad.geometry.pull import even
+
+    patch = chain.patches[number]
+    return even(patch, _shifts(patch, _joints_of(chain, number)), (True, True))
+
+
+def _shifts(patch: Patch, joints: tuple[Joint | None, Joint | None]) -> Array:
+    """What the mitres at both ends add to n, (2, 3)."""
+    ends = _end_frames(patch)
+    return np.stack([mitre(ends, row, joints[row]) - ends.n[row] for row in (0, 1)])
+
+
+def _end_frames(patch: Patch) -> Frame:
+    low, high = patch.domain
+    return patch.frame([np.nextafter(low, high), np.nextafter(high, low)])
+
+
+def _creased(joints: tuple[Joint | None, Joint | None]) -> bool:
+    return any(joint is not None and not joint.smooth for joint in joints)

@@ -86,13 +86,15 @@ class Patch:
     ``field(t, order)`` gives the RulingJet at t (n,), on the closed domain. ``breaks`` are the
     interior parameters where the patch is less smooth than elsewhere (spline knots, line to
     arc); quadrature, fits and rulings break there. ``causal`` is "spacelike" or "timelike"
-    when the construction was Minkowskian.
+    when the construction was Minkowskian. ``inside_radius`` in mm is that of a bend made at once,
+    about the ruling in the middle of its domain; None where the sheet is flat or rolled.
     """
 
     field: Field
     domain: tuple[float, float]
     breaks: tuple[float, ...] = ()
     causal: str | None = None
+    inside_radius: float | None = None
 
     @property
     def ends(self) -> tuple[float, ...]:

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -22,6 +23,9 @@ from devcad.geometry import taylor
 from devcad.geometry.classify import panels
 from devcad.geometry.patch import Patch
 from devcad.geometry.taylor import Array
+
+if TYPE_CHECKING:  # only thick sheets with creases have one
+    from devcad.geometry.pull import Pull
 
 TURN = np.radians(30.0)
 """Largest turning of the normal, or of the ruling in the sheet, across one strip."""
@@ -45,10 +49,13 @@ class Placement:
     deviation: float
 
 
-def place(patch: Patch, layers: tuple[float, ...], tolerance: float) -> Placement:
+def place(
+    patch: Patch, layers: tuple[float, ...], tolerance: float, pull: Pull | None = None
+) -> Placement:
     """The fewest rulings whose triangles stay within ``tolerance`` (mm) of every layer.
 
-    ``layers`` are the distances along n of the surfaces to be meshed. Rulings break where the
+    ``layers`` are the distances along n of the surfaces to be meshed, ``pull`` what draws their
+    edges to the mitres of creases. Rulings break where the
     surface's curvature jumps; at smoother breaks they need not. At most 30 degrees of turning
     lie in one strip. Strips of a segment are equal in their distance to the surface; only where
     breaks leave a patch of 16 strips far below its tolerance, one segment is filled from its
@@ -58,8 +65,11 @@ def place(patch: Patch, layers: tuple[float, ...], tolerance: float) -> Placemen
         LimitError: more rulings than a part can have.
     """
     ends = _segments(patch, layers)
+    if pull is not None:
+        ends = np.unique(np.concatenate([ends, pull.breaks]))
     segments = [
-        _Segment(patch, layers, low, high, tolerance) for low, high in itertools.pairwise(ends)
+        _Segment(patch, layers, low, high, tolerance, pull)
+        for low, high in itertools.pairwise(ends)
     ]
     pieces = [segment.fewest() for segment in segments]
     if sum(len(piece.t) - 1 for piece in pieces) >= MANY:
@@ -71,16 +81,20 @@ def place(patch: Patch, layers: tuple[float, ...], tolerance: float) -> Placemen
     return Placement(t, max(piece.deviation for piece in pieces))
 
 
-def strip_deviation(patch: Patch, layers: tuple[float, ...], t: Array) -> Array:
+def strip_deviation(
+    patch: Patch, layers: tuple[float, ...], t: Array, pull: Pull | None = None
+) -> Array:
     """The certified distance between the patch and the triangles of each strip, (n - 1,).
 
     The largest distance of a rail to its chord, looked at 11 times a strip, plus a quarter of
-    the strip's departure from a plane (half the distance of its diagonals' middles).
+    the strip's departure from a plane (half the distance of its diagonals' middles), or of a
+    wall's that leans because of a ``pull``.
     """
     low, high = t[:-1], t[1:]
     inner = low[:, None] + (high - low)[:, None] * INNER
-    corners = _rails(patch, layers, t)  # (rails, n, 3)
-    curves = _rails(patch, layers, inner.ravel()).reshape(len(corners), len(low), len(INNER), 3)
+    corners = _rails(patch, layers, t, pull)  # (rails, n, 3)
+    curves = _rails(patch, layers, inner.ravel(), pull)
+    curves = curves.reshape(len(corners), len(low), len(INNER), 3)
     start = corners[:, :-1, None]
     chord = corners[:, 1:, None] - start
     length = np.maximum((chord**2).sum(axis=-1, keepdims=True), 1e-300)
@@ -91,23 +105,43 @@ def strip_deviation(patch: Patch, layers: tuple[float, ...], t: Array) -> Array:
     skew = corners[:half, :-1] + corners[half:, 1:] - corners[half:, :-1] - corners[:half, 1:]
     normal = patch.frame(0.5 * (low + high)).n
     flatness = np.abs(np.einsum("rni,ni->rn", skew, normal)).max(axis=0)
+    if pull is not None:
+        flatness = np.maximum(flatness, _leaning(corners, normal))
     return np.asarray(sagitta + 0.25 * flatness)
 
 
-def _rails(patch: Patch, layers: tuple[float, ...], t: Array) -> Array:
+def _leaning(corners: Array, normal: Array) -> Array:
+    """How far the walls between the outer layers' edges (rails, n, 3) are from plane, strip by
+    strip, (n - 1,)."""
+    half = len(corners) // 2
+    worst = np.zeros(len(normal))
+    for low, high in ((corners[0], corners[half - 1]), (corners[half], corners[-1])):
+        chord = np.diff(low + high, axis=0)
+        across = taylor.rows_cross(chord, normal)
+        size = np.maximum(np.linalg.norm(across, axis=1), 1e-300)
+        skew = np.abs(taylor.rows_dot(np.diff(high - low, axis=0), across)) / size
+        worst = np.maximum(worst, skew)
+    return worst
+
+
+def _rails(patch: Patch, layers: tuple[float, ...], t: Array, pull: Pull | None = None) -> Array:
     """The rails at t, (2 * layers, n, 3): first all layers' v_from ends, then the v_to ends."""
     if layers == (0.0,):
         jet = patch.jet(t, 0)
         c0, e, v = jet.c0[0], jet.e[0], (jet.v_from[0], jet.v_to[0])
         return np.asarray(np.stack([c0 + v[0][:, None] * e, c0 + v[1][:, None] * e]))
     frame = patch.frame(t)
-    return np.stack(
+    rails = np.stack(
         [
             frame.c0 + v[:, None] * frame.e + d * frame.n
             for v in (frame.v_from, frame.v_to)
             for d in layers
         ]
     )
+    if pull is not None:
+        shifts = pull.rails(t)
+        rails += np.stack([d * shifts[:, side] for side in (0, 1) for d in layers])
+    return rails
 
 
 def _density(patch: Patch, layers: tuple[float, ...], t: Array, tolerance: float) -> Array:
@@ -131,9 +165,15 @@ class _Segment:
     """One segment between forced rulings, and how rulings can be laid on it."""
 
     def __init__(
-        self, patch: Patch, layers: tuple[float, ...], low: float, high: float, tolerance: float
+        self,
+        patch: Patch,
+        layers: tuple[float, ...],
+        low: float,
+        high: float,
+        tolerance: float,
+        pull: Pull | None = None,
     ) -> None:
-        self.patch, self.layers, self.aim = patch, layers, USED * tolerance
+        self.patch, self.layers, self.aim, self.pull = patch, layers, USED * tolerance, pull
         inner = [x for x in panels(patch) if low < x < high]
         pieces = itertools.pairwise([low, *inner, high])
         starts = [np.linspace(a, b, GRID)[:-1] for a, b in pieces]
@@ -166,7 +206,8 @@ class _Segment:
         share = np.append(np.arange(np.ceil(number - 1e-9)) / number, 1.0)
         t = np.interp(share * self.density[-1], self.density, self.grid)
         t[0], t[-1] = self.grid[0], self.grid[-1]
-        placed = Placement(t, float(strip_deviation(self.patch, self.layers, t).max()))
+        away = strip_deviation(self.patch, self.layers, t, self.pull)
+        placed = Placement(t, float(away.max()))
         turn = float(np.diff(np.interp(t, self.grid, self.turned)).max())
         # twelve strips of 30 degrees go round, whatever the rounding of their sum
         return placed, max(np.sqrt(placed.deviation / self.aim), turn / TURN * (1.0 - 1e-9))

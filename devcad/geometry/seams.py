@@ -8,8 +8,10 @@ start or the end of the other, and round a closed edge from anywhere.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -66,7 +68,7 @@ class Meeting:
 
     ``gap`` is the largest distance between them and ``length`` what each measures, mm;
     ``matched`` says that the gap is within the job's tolerance, ``joined`` that the meshes have
-    the same points there, to the bit.
+    the same points there, to the bit. ``stitches`` are the figures of a seam that is sewn.
     """
 
     edges: tuple[tuple[str, str], tuple[str, str]]
@@ -74,6 +76,7 @@ class Meeting:
     length: tuple[float, float]
     matched: bool
     joined: bool
+    stitches: Mapping[str, Any] | None = None
 
 
 @dataclass(frozen=True, slots=True)

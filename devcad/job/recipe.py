@@ -127,11 +127,17 @@ def resolve(
     sources = [_read(name or DEFAULT), override]
     shop = settings([_told(source, set(SHOP)) for source in sources])
     keys = {key: value for source in sources for key, value in _flat(source).items()}
-    chosen = known_formats(list(formats)) or keys.pop("formats", DEFAULT_FORMATS)
+    chosen = known_formats(list(formats)) or _with_bends(keys.get("formats", DEFAULT_FORMATS), shop)
     keys.pop("formats", None)
     allowed = {*known_checks(list(allow)), *keys.pop("allow", ())}
     options = replace(Options(**keys), pdf=shop.pdf, kerf=shop.sheet.kerf)
     return Recipe(tuple(chosen), options, frozenset(allowed), shop)
+
+
+def _with_bends(formats: Iterable[str], shop: ShopSettings) -> list[str]:
+    """The formats of a recipe, with the bend table beside the DXF of a part for the press brake."""
+    pressed = shop.bends.mode == "press-brake" and "dxf" in formats
+    return list(dict.fromkeys([*formats, *(["bends"] if pressed else [])]))
 
 
 def recipe_names() -> dict[str, str]:
@@ -175,12 +181,13 @@ def _told(table: RecipeTable, names: set[str]) -> dict[str, Any]:
 
 def _flat(table: RecipeTable) -> dict[str, Any]:
     """The keys that are given, as the exporters' options name them."""
-    keys = _told(table, {"formats", "step", "dxf", "allow"})
-    step, dxf = keys.pop("step"), keys.pop("dxf")
+    keys = _told(table, {"formats", "step", "dxf", "glb", "allow"})
+    step, dxf, glb = keys.pop("step"), keys.pop("dxf"), keys.pop("glb")
     return {
         **keys,
         **{f"step_{key}": value for key, value in step.items()},
         **{f"dxf_{key}": value for key, value in dxf.items()},
+        **{f"glb_{key}": value for key, value in glb.items()},
     }
 
 

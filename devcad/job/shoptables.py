@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from itertools import pairwise
 from typing import Annotated, ClassVar
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, WithJsonSchema, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
 from devcad.errors import JobError
 from devcad.job.invalid import did_you_mean
@@ -257,24 +257,10 @@ class LabelsTable(Table):
     height: Length | None = Field(None, description="mm, of a capital letter")
 
 
-def _not_yet(value: bool | None) -> bool | None:
-    """Only false: no exporter writes an animation."""
-    if value:
-        raise JobError(
-            "this version writes no animation",
-            value="true",
-            limit="false",
-            remedy="leave the key out; bend = 0 to 1 in the job gives any one state",
-        )
-    return value
-
-
 class GlbTable(Table):
     """How glTF files are written."""
 
-    animate: Annotated[bool | None, AfterValidator(_not_yet), WithJsonSchema({"const": False})] = (
-        None
-    )
+    animate: bool | None = Field(None, description="whether they unroll and fold; default false")
 
 
 SHOP: Mapping[str, type[Table]] = {

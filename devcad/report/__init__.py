@@ -106,6 +106,7 @@ def _seam(meeting: Meeting) -> dict[str, Any]:
         "matched": meeting.matched,
         "joined": meeting.joined,
         "length": list(meeting.length),
+        **({"stitches": meeting.stitches} if meeting.stitches else {}),
     }
 
 

@@ -74,7 +74,7 @@ def join(before: Side, after: Side, kind: str, size: float) -> Joint:
     a, b = before.ends[1], after.ends[0]
     if np.hypot(*(b - a)) <= CLOSED * size:
         return Joint()
-    link = _Links(before.edge.name, CLOSED * size)
+    link = Links(before.edge.name, CLOSED * size)
     t, w = before.tangents[1], after.tangents[0]
     sine, cosine = float(cross(t, w)), float(dot(t, w))
     d, e = before.distance, after.distance
@@ -111,7 +111,7 @@ def _way_round(before: Edge, after: Edge) -> float:
 
 
 @dataclass(frozen=True, slots=True)
-class _Links:
+class Links:
     """Makes the edges of a joint: a cutout's where it belongs to one, none that is a point."""
 
     side: str
@@ -119,6 +119,7 @@ class _Links:
 
     @property
     def name(self) -> str:
+        """That of the edges."""
         return CUTOUT if self.side == CUTOUT else CORNER
 
     def lines(self, *points: Array) -> tuple[Edge, ...]:
@@ -141,7 +142,7 @@ class _Links:
 
 
 def _opening(
-    before: Side, after: Side, kind: str, meet: tuple[float, float], way: float, link: _Links
+    before: Side, after: Side, kind: str, meet: tuple[float, float], way: float, link: Links
 ) -> tuple[Edge, ...]:
     """The edges over a corner at which the parallel curves leave a gap; ``way`` is its turn."""
     a, b = before.ends[1], after.ends[0]
@@ -155,7 +156,7 @@ def _opening(
         reached = a + np.sqrt(e * e - d * d) * t
         return link.lines(a, reached) + link.arc(corner, reached, b, way)
     far = max(d, e) * (1.0 if kind == "square" else MITRE_LIMIT)
-    out = (a - corner) + (b - corner)
+    out = t - w  # along the bisector
     out = out / max(float(np.hypot(*out)), np.finfo(float).tiny)
     rise, fall = float(dot(t, out)), float(-dot(w, out))
     if rise > 0.0 and fall > 0.0:
@@ -172,7 +173,7 @@ def _opening(
 
 
 @dataclass(frozen=True, slots=True)
-class _Leg:
+class Leg:
     """A side seen from the corner: w = 0 there, 1 at its other end; below 0 the straight ray on
     which it would go on, ``ray`` mm for each unit of w."""
 
@@ -182,6 +183,10 @@ class _Leg:
     end: Array
     ahead: Array
     ray: float
+
+    def u(self, w: float) -> float:
+        """The edge's parameter at w, 0 <= w <= 1."""
+        return float(self.near + w * (self.far - self.near))
 
     def at(self, w: float) -> tuple[Array, Array]:
         """The point and its derivative at w."""
@@ -207,28 +212,23 @@ class _Leg:
 
 
 def _crossing(
-    before: Side, after: Side, meet: tuple[float, float], size: float, link: _Links
+    before: Side, after: Side, meet: tuple[float, float], size: float, link: Links
 ) -> Joint:
     """The joint of sides that cross, or of which one reaches the other when it goes on straight:
     at the crossing nearest to the corner along both."""
     ray = MITRE_LIMIT * max(abs(before.distance), abs(after.distance))
     u, v = before.edge.u, after.edge.u
     legs = (
-        _Leg(before.edge, u[-1], u[0], before.ends[1], before.tangents[1], ray),
-        _Leg(after.edge, v[0], v[-1], after.ends[0], -after.tangents[0], ray),
+        Leg(before.edge, u[-1], u[0], before.ends[1], before.tangents[1], ray),
+        Leg(after.edge, v[0], v[-1], after.ends[0], -after.tangents[0], ray),
     )
-    beyond = (meet[0] > 0.0, meet[1] > 0.0)
-    for start in _guesses(legs, beyond):
-        found = _newton(legs, start, CLOSED * 1e-4 * size)
-        if found is None or any(
-            not (-1.0 if out else -1e-12) <= w <= 1.0 + 1e-12
-            for w, out in zip(found, beyond, strict=True)
-        ):
-            continue
+    low = (-1.0 if meet[0] > 0.0 else 0.0, -1.0 if meet[1] > 0.0 else 0.0)
+    found = crossing(legs, low, size)
+    if found is not None:
         x = legs[0].at(found[0])[0]
         return Joint(
-            None if found[0] < 0.0 else legs[0].near + found[0] * (legs[0].far - legs[0].near),
-            None if found[1] < 0.0 else legs[1].near + found[1] * (legs[1].far - legs[1].near),
+            None if found[0] < 0.0 else legs[0].u(found[0]),
+            None if found[1] < 0.0 else legs[1].u(found[1]),
             (link.lines(before.ends[1], x) if found[0] < 0.0 else ())
             + (link.lines(x, after.ends[0]) if found[1] < 0.0 else ()),
         )
@@ -244,7 +244,22 @@ def _crossing(
     )
 
 
-def _guesses(legs: Sequence[_Leg], beyond: tuple[bool, bool]) -> list[tuple[float, float]]:
+def crossing(
+    legs: Sequence[Leg], low: tuple[float, float], size: float
+) -> tuple[float, float] | None:
+    """Where (w) two legs cross nearest to the corner, not before ``low`` on either (-1 allows the
+    ray); None where they do not. ``size`` is the contour's, mm."""
+    starts = _guesses(legs, (low[0] < 0.0, low[1] < 0.0))
+    for start in (*starts, (0.0, 0.0)):  # chords of curves that are almost tangent may not cross
+        found = _newton(legs, start, CLOSED * 1e-4 * size)
+        if found is not None and all(
+            least - 1e-12 <= w <= 1.0 + 1e-12 for w, least in zip(found, low, strict=True)
+        ):
+            return found
+    return None
+
+
+def _guesses(legs: Sequence[Leg], beyond: tuple[bool, bool]) -> list[tuple[float, float]]:
     """Places near which two legs cross, those nearest to the corner first."""
     (wa, pa, ra), (wb, pb, rb) = (leg.samples() for leg in legs)
     a, b = pa[:-1], pb[:-1]
@@ -268,7 +283,7 @@ def _guesses(legs: Sequence[_Leg], beyond: tuple[bool, bool]) -> list[tuple[floa
 
 
 def _newton(
-    legs: Sequence[_Leg], start: tuple[float, float], near: float
+    legs: Sequence[Leg], start: tuple[float, float], near: float
 ) -> tuple[float, float] | None:
     """The places at which two legs cross, to rounding; None where the steps do not settle."""
     w = np.array(start)
@@ -294,6 +309,11 @@ def cut(side: Side, since: float | None, until: float | None) -> Side | None:
     way = 1.0 if u[-1] > u[0] else -1.0
     if way * (high - low) <= 0.0:
         return None
-    inner = u[1:-1]
-    inner = inner[(way * (inner - low) > 0.0) & (way * (high - inner) > 0.0)]
-    return replace(side, edge=replace(side.edge, u=np.concatenate([[low], inner, [high]])))
+    return replace(side, edge=between(side.edge, low, high))
+
+
+def between(edge: Edge, low: float, high: float) -> Edge:
+    """The piece of an edge run from one of its u to another, either way."""
+    inner = edge.u[(edge.u > min(low, high)) & (edge.u < max(low, high))]
+    inner = np.sort(inner) if high > low else np.sort(inner)[::-1]
+    return replace(edge, u=np.concatenate([[low], inner, [high]]))

@@ -52,6 +52,7 @@ def bounds(limits: Limits, bends: Bends, material: Material | None, thickness: f
 
     Springback is looked at where the recipe asks for it and the material is known.
     """
+
     def mm(share: float | None) -> float | None:
         return None if share is None else share * thickness
 
@@ -112,9 +113,16 @@ def _near(
         return None
     value, where = found
     passed = value >= limit * (1.0 - 1e-9)  # a length as long as its limit is long enough
-    return Check(
-        name, panel.name, value, limit, "mm", passed, where, says.format(value), _REMEDY[name]
-    )
+    words = says.format(value) + _at(where)
+    return Check(name, panel.name, value, limit, "mm", passed, where, words, _REMEDY[name])
+
+
+def _at(where: Where) -> str:
+    """A place of the pattern in words."""
+    if where.flat is None:
+        return ""
+    x, y = where.flat
+    return f" at ({x:.6g}, {y:.6g}) in the pattern"
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,7 +143,8 @@ def _tightest(panel: Panel, surface: Chain, sharp: float | None) -> _Tightest:
     lines = [line for line in panel.pattern.lines if line.angle]
     if sharp is not None and lines and sharp < radius:
         middle = 0.5 * (lines[0].start + lines[0].end)
-        return _Tightest(sharp, Where(flat=(float(middle[0]), float(middle[1]))), "a bend line")
+        place_on_line = Where(flat=(float(middle[0]), float(middle[1])))
+        return _Tightest(sharp, place_on_line, f"the bend line{_at(place_on_line)}")
     return _Tightest(radius, _where(panel, surface, number, place), f"t = {place.t:.6g}")
 
 
@@ -148,7 +157,7 @@ def _bend_radius(panel: Panel, tightest: _Tightest, limit: float | None) -> Chec
         tightest.radius,
         limit,
         "mm",
-        tightest.radius >= limit,
+        tightest.radius >= limit * (1.0 - 1e-9),  # a radius as small as its limit will do
         tightest.where,
         f"the inside radius is {tightest.radius:.4g} mm at {tightest.at}",
         "use a thinner or softer sheet, or a larger radius",
@@ -242,7 +251,7 @@ def _where(panel: Panel, surface: Chain, number: int, place: Extreme) -> Where:
     t, v = np.array([place.t]), np.array([place.v])
     x, y, z = patch.point(t, v)[0].tolist()
     flat = None
-    if panel.blank is not None and len(panel.blank.middle.patches) == len(surface.patches):
+    if panel.blank is not None and panel.blank.middle is surface:
         across, up = panel.blank.points(number, t, v)[0].tolist()
         flat = across, up
     return Where(place.t, place.v, (x, y, z), flat)

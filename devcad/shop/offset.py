@@ -73,13 +73,12 @@ def offset_contour(
         or the whole contour vanishes.
     """
     kinds = [corners] * len(contour) if isinstance(corners, str) else list(corners)
-    size = float(np.ptp(np.concatenate([_ends(edge) for edge in contour]), axis=0).max())
-    size = max(size, max(length_bound(edge) for edge in contour) / np.pi)
+    size = size_of(contour)
     rows = zip(contour, distances, kinds, strict=True)
     kept = [row for row in rows if length_bound(row[0]) > CLOSED * size]
     if not any(distance for _, distance, _ in kept):
         return tuple(edge for edge, _, _ in kept)
-    made = [(_side(edge, distance), kind) for edge, distance, kind in kept]
+    made = [(side_of(edge, distance), kind) for edge, distance, kind in kept]
     # an arc about the end of its normals becomes a point: there its neighbours meet
     made = [(side, kind) for side, kind in made if length_bound(side.edge) > CLOSED * size]
     if not made:
@@ -94,7 +93,13 @@ def offset_contour(
     return result
 
 
-def _side(edge: Edge, distance: float) -> Side:
+def size_of(contour: tuple[Edge, ...]) -> float:
+    """About the larger side of a contour's box, mm."""
+    size = float(np.ptp(np.concatenate([_ends(edge) for edge in contour]), axis=0).max())
+    return max(size, max(length_bound(edge) for edge in contour) / np.pi)
+
+
+def side_of(edge: Edge, distance: float) -> Side:
     """An edge's parallel curve with what its joints ask for."""
     moved = offset_edge(edge, distance)
     u = np.array([edge.u[0], edge.u[-1]])
@@ -130,19 +135,28 @@ def _assembled(sides: list[Side], joints: list[Joint]) -> tuple[Edge, ...]:
     """What is left of the sides, and the edges between them, in order."""
     out: list[Edge] = []
     for side, before, after in zip(sides, [joints[-1], *joints[:-1]], joints, strict=True):
-        left = cut(side, before.since, after.until)
-        if left is None:
-            length = length_bound(side.edge)
-            raise GeometryError(
-                f"an offset of {side.distance:.4g} mm leaves nothing of the side {side.edge.name}",
-                place=side.where,
-                value=length,
-                limit=abs(side.distance),
-                remedy="use a smaller offset",
-            )
-        _refuse_fold(left)
-        out += [left.edge, *after.links]
+        out += [left_of(side, before, after), *after.links]
     return tuple(out)
+
+
+def left_of(side: Side, before: Joint, after: Joint) -> Edge:
+    """What the joints at its ends leave of a side.
+
+    Raises:
+        GeometryError: nothing, or the parallel curve runs backwards.
+    """
+    left = cut(side, before.since, after.until)
+    if left is None:
+        length = length_bound(side.edge)
+        raise GeometryError(
+            f"an offset of {side.distance:.4g} mm leaves nothing of the side {side.edge.name}",
+            place=side.where,
+            value=length,
+            limit=abs(side.distance),
+            remedy="use a smaller offset",
+        )
+    _refuse_fold(left)
+    return left.edge
 
 
 def _refuse_nothing(contour: tuple[Edge, ...], distances: Sequence[float]) -> NoReturn:
@@ -186,12 +200,10 @@ def _refuse_crossing(
     made: tuple[Edge, ...], contour: tuple[Edge, ...], reach: float, size: float
 ) -> None:
     """GeometryError where the new contour crosses or touches itself, or runs the other way."""
-    new, old = (fine_polygon(edges, FINE * size)[0] for edges in (made, contour))
-    at = self_crossing(new)
-    if at is None and twice_area(new) * twice_area(old) > 0.0:
+    found = crossing_at(made, contour, size)
+    if found is None:
         return
-    point = np.array(at) if at else new.mean(axis=0)
-    width = _width(old, point)
+    point, width = found
     raise GeometryError(
         f"an offset of up to {reach:.4g} mm crosses itself where the contour is {width:.4g} mm "
         "wide",
@@ -200,6 +212,19 @@ def _refuse_crossing(
         limit=2.0 * reach,
         remedy="use a smaller offset, or widen the neck",
     )
+
+
+def crossing_at(
+    made: tuple[Edge, ...], contour: tuple[Edge, ...], size: float
+) -> tuple[Array, float] | None:
+    """Where a contour made from another crosses or touches itself, or where it is when it runs the
+    other way, and about how wide the old one is there in mm; None where it does not."""
+    new, old = (fine_polygon(edges, FINE * size)[0] for edges in (made, contour))
+    at = self_crossing(new)
+    if at is None and twice_area(new) * twice_area(old) > 0.0:
+        return None
+    point = np.array(at) if at else new.mean(axis=0)
+    return point, _width(old, point)
 
 
 def _width(polygon: Array, point: Array) -> float:

@@ -48,13 +48,16 @@ def stations(panel: Panel, every: float, flow: float | None) -> tuple[Station, .
     Args:
         flow: the material's sigma / (E T) in 1/mm, None where it is unknown.
     """
-    if panel.blank is None:
+    if panel.blank is None or panel.bends:  # bent on a press brake
         return ()
     out: list[Station] = []
     start = np.zeros(2)
     for middle, flat in zip(panel.blank.middle.patches, panel.blank.chain.patches, strict=True):
         along = _lengths(flat)
         total = along(np.array(flat.domain[1:]))[0]
+        if middle.inside_radius is not None:  # made at once, between flats or rolled parts
+            start = start + total
+            continue
         longer = int(np.argmax(total))
         for low, high in pairwise(middle.segments.tolist()):
             t = _spaced(along, longer, low, high, every)

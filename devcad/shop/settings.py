@@ -124,7 +124,7 @@ class Notches:
 
     every: int = 10
     shape: NotchShape = "V"
-    depth: float = 3.0
+    depth: float = 2.5
 
 
 @dataclass(frozen=True, slots=True)

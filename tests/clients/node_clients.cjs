@@ -53,12 +53,34 @@ async function stl(file) {
   return { triangles: geometry.attributes.position.count / 3, min: min.toArray(), max: max.toArray() };
 }
 
+// Where the points of the meshes are at times of an animation that no key may have.
+function poses(THREE, scene, clip) {
+  const mixer = new THREE.AnimationMixer(scene);
+  mixer.clipAction(clip).play();
+  const point = new THREE.Vector3();
+  return [0, 0.1, 0.7, 1.3, 2, 2.5, 4.1].map((time) => {
+    mixer.setTime(time);
+    scene.updateMatrixWorld(true);
+    const meshes = {};
+    scene.traverse((thing) => {
+      if (!thing.isMesh) return;
+      const points = [];
+      for (let i = 0; i < thing.geometry.attributes.position.count; i++) {
+        thing.getVertexPosition(i, point);
+        points.push(...thing.localToWorld(point).toArray());
+      }
+      meshes[thing.name] = points;
+    });
+    return { time, meshes };
+  });
+}
+
 async function glb(file) {
   const validated = await home('gltf-validator').validateBytes(bytes(file), { uri: path.basename(file) });
   const { numErrors, numWarnings, numHints, messages } = validated.issues;
   const THREE = await three('build/three.module.js');
   const { GLTFLoader } = await three('examples/jsm/loaders/GLTFLoader.js');
-  const scene = (await new GLTFLoader().parseAsync(bytes(file).buffer, '')).scene;
+  const { scene, animations } = await new GLTFLoader().parseAsync(bytes(file).buffer, '');
   scene.updateMatrixWorld(true);
   const box = new THREE.Box3().setFromObject(scene);
   const meshes = [];
@@ -76,6 +98,7 @@ async function glb(file) {
     });
   });
   return {
+    poses: animations.length ? poses(THREE, scene, animations[0]) : [],
     issues: { errors: numErrors, warnings: numWarnings, hints: numHints },
     messages,
     min: box.min.toArray(),

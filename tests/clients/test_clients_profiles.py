@@ -26,11 +26,75 @@ SAMPLES = ("drilled-reducer", "square-duct", "three-piece-elbow")  # holes, bend
 VERSIONS = ("R12", "R2000", "R2010")
 SQUARE = """
 name = "square"
+[meta]
+grain = 90
+[recipe.labels]
+height = 8
 [surface]
 kind = "plane"
 height = 100
 width = 100
 """
+POUCH = """
+name = "pouch"
+thickness = 1.5
+material = "veg-tan-leather"
+pipeline = "leather"
+
+[meta]
+part_number = "P-3"
+revision = "B"
+quantity = 2
+grain = 90
+
+[recipe.stitch]
+pitch = 4
+inset = 10
+hole = "round"
+diameter = 1
+
+[recipe.notches]
+every = 5
+shape = "V"
+depth = 3
+
+[recipe.labels]
+height = 5
+
+[[panel]]
+name = "front"
+[panel.surface]
+kind = "plane"
+width = 140
+height = 90
+[[panel.cutout]]
+shape = "circle"
+diameter = 20
+at = [45, 45]
+[panel.edges.top]
+allowance = 10
+[panel.edges.base]
+finish = "turned"
+[panel.edges.start]
+finish = "tab"
+
+[[panel]]
+name = "back"
+[panel.surface]
+kind = "plane"
+width = 140
+height = 90
+[panel.place]
+origin = [140, 0, 0]
+[panel.edges.base]
+allowance = 10
+[panel.edges.top]
+finish = "lap"
+
+[[seam]]
+edges = ["front.top", "back.base"]
+"""
+"""Two pieces with everything that sewing, gluing and matching draws."""
 SIDE = 100.0  # mm
 DPI = 600
 
@@ -39,7 +103,9 @@ DPI = 600
 def drawings(tmp_path_factory: pytest.TempPathFactory) -> dict[tuple[str, str], list[Path]]:
     """The files of three samples by profile and version."""
     home = tmp_path_factory.mktemp("profiles")
-    parts = [devcad.build(clients.REPOSITORY / "samples" / f"{name}.toml") for name in SAMPLES]
+    (home / "pouch.toml").write_text(POUCH)
+    jobs = [clients.REPOSITORY / "samples" / f"{name}.toml" for name in SAMPLES]
+    parts = [devcad.build(job) for job in (*jobs, home / "pouch.toml")]
     found: dict[tuple[str, str], list[Path]] = {}
     for name in PROFILES:
         for version in VERSIONS:
@@ -138,6 +204,61 @@ def test_freecad_imports_every_line_at_its_length(
         assert "error" not in seen, seen["error"]
         found = sum(layer["length"] for layer in seen["layers"].values())
         assert found == pytest.approx(sum(map(_length, _entities(path))), rel=1e-5)
+
+
+def _pouch(drawings: dict[tuple[str, str], list[Path]], name: str) -> list[Path]:
+    """The drawings of its two pieces, front and back, in the profile's old version."""
+    return [path for path in drawings[name, "R12"] if path.name.startswith("pouch")]
+
+
+def test_a_sewn_piece_tells_its_holes_notches_grain_and_labels(
+    drawings: dict[tuple[str, str], list[Path]], parser_sees: Look
+) -> None:
+    """As D6673 numbers them: drill holes 13, notches 4, grain 7, sew lines 14, cutout 11, and on 8
+    what is drawn; 70 mm of the seam of 90 are sewn with 18 holes, and every fifth has a notch."""
+    front, back = _pouch(drawings, "astm")
+    for path, cutouts in ((front, 1), (back, 0)):
+        found = Counter((e["type"], e["layer"]) for e in parser_sees(path)["entities"])
+        assert found["POINT", "13"] == 18
+        assert found["POINT", "4"] == 4
+        assert found["LINE", "7"] == 1
+        assert found["POLYLINE", "11"] == cutouts
+        assert found["LINE", "14"] >= 1
+        assert found["POLYLINE", "8"] > 10
+        assert {e["layer"] for e in parser_sees(path)["entities"]} <= set(profile("astm").layers)
+
+
+def test_notches_lie_on_the_boundary_and_holes_and_labels_inside_it(
+    drawings: dict[tuple[str, str], list[Path]],
+) -> None:
+    from shapely import LineString, Point, Polygon
+
+    for path in _pouch(drawings, "astm"):
+        found: dict[tuple[str, str], list[Any]] = {}
+        for entity in _entities(path):
+            found.setdefault((entity.dxftype(), entity.dxf.layer), []).append(entity)
+        (boundary,) = found["POLYLINE", "1"]
+        piece = Polygon([(p.x, p.y) for p in _points(boundary)])
+        places = {layer: found["POINT", layer] for layer in ("4", "13")}
+        points = {
+            layer: [Point(tuple(e.dxf.location)[:2]) for e in some]
+            for layer, some in places.items()
+        }
+        assert max(piece.exterior.distance(point) for point in points["4"]) < 1e-9
+        assert all(piece.contains(point) for point in points["13"])
+        drawn = [e for kind in ("LINE", "POLYLINE") for e in found[kind, "8"]]
+        lines = [LineString([(p.x, p.y) for p in _points(e)]) for e in drawn]
+        assert all(piece.buffer(1e-6).contains(line) for line in lines)
+
+
+@pytest.mark.parametrize("name", ["sendcutsend", "lightburn"])
+def test_a_service_cuts_outline_and_holes_and_engraves_the_labels(
+    drawings: dict[tuple[str, str], list[Path]], parser_sees: Look, name: str
+) -> None:
+    for path, holes in zip(_pouch(drawings, name), (19, 18), strict=True):
+        seen = parser_sees(path)["entities"]
+        assert Counter(e["layer"] for e in seen)["CUT"] == 1 + holes
+        assert Counter(e["layer"] for e in seen)["ENGRAVE"] > 20
 
 
 @pytest.mark.parametrize("name", PROFILES)

@@ -9,10 +9,22 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from drawings import INNER, OUTER, bow, job, lampshade, lens, off_ellipse, panel, straight
+from drawings import (
+    INNER,
+    OUTER,
+    ROLES,
+    bow,
+    job,
+    lampshade,
+    lens,
+    off_ellipse,
+    panel,
+    straight,
+    workpiece,
+)
 from hypothesis import given
 from hypothesis import strategies as st
-from pages import form, layers, pages, paths, squares
+from pages import form, layers, pages, paths, squares, streams
 
 from devcad.errors import CheckFailed, FileError, JobError, LimitError
 from devcad.export import Options, pdfcanvas
@@ -272,6 +284,16 @@ def test_layers_are_optional_content_groups(tmp_path):
     assert names == {"RULING", "BEND_UP", "CUT_INNER", "CUT_OUTER", "TILES", "CONTROL"}
     assert data.startswith(b"%PDF-1.5")  # optional content came with 1.5
     assert b"/OCProperties" in data
+
+
+def test_every_role_is_a_layer_that_the_legend_explains(tmp_path):
+    data = file_of(tmp_path, workpiece(), paper("A4"))
+    names = {name.decode() for name in re.findall(rb"/Name \((\w+)\) /Type /OCG", data)}
+    roles = {*ROLES, "RULING", "BEND_UP", "BEND_DOWN", "STITCH", "CUT_INNER", "CUT_OUTER"}
+    assert names == roles | {"TILES", "CONTROL"}
+    told = "".join(text for _, text in streams(data))
+    for words in ("sew", "grain", "label", "glue here", "match with the neighbour"):
+        assert f"({words}) Tj" in told
 
 
 def test_holes_are_drawn_before_the_outline_and_nothing_is_filled(tmp_path):

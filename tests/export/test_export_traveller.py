@@ -132,8 +132,9 @@ def test_the_page_says_what_the_shop_asks_for(hopper):
     assert "hopper lid" in lid
     (names,) = [line for line in lid if "part number" in line]
     assert names == "part number H-17   revision C   quantity 4   Trichter für Schüttgut"
-    for line in ("200.00 x 120.00 mm", "24000.0 mm2", "376.8 g", "640.0 mm", "90 deg from +x"):
+    for line in ("200.00 x 120.00 mm", "24000.0 mm2", "376.8 g", "640.0 mm"):
         assert line in lid
+    assert "90 deg from +x; may turn by 180" in lid  # as the nest turns it
     assert any("DC01" in line and "not verified" in line for line in lid)
     assert {"cut", "inspected"} <= set(lid)
     assert "bent" not in lid
@@ -193,6 +194,72 @@ def test_a_long_table_says_where_the_rest_stands(tmp_path):
     (lines,) = words(written.path.read_bytes())
     assert "+177" in lines  # 24 rows: 23 bends and this one
     assert "in the drawing" in lines
+
+
+def test_bends_of_a_press_brake_tell_their_radii_and_when_they_are_bent(tmp_path):
+    made = bent(2)
+    first, second = made.pattern.lines
+    lines = (
+        replace(first, radius=(40.0, 60.0), order=1),
+        replace(second, radius=(5.0, 5.0), order=2),
+    )
+    made = replace(made, pattern=replace(made.pattern, lines=lines))
+    (written,) = traveller.write(job(made), tmp_path, Options())
+    (found,) = words(written.path.read_bytes())
+    at = found.index("1.0, 5.0")
+    assert {"radius", "order"} <= set(found)
+    assert found[at : at + 6] == ["1.0, 5.0", "1.0, 90.0", "5.73", "down", "40.0 / 60.0", "1"]
+    assert found[found.index("2.0, 5.0") + 1 :][:5] == ["2.0, 90.0", "11.46", "up", "5.0", "2"]
+
+
+SEWN = {
+    "stitches": [
+        {
+            "edge": "top",
+            "mate": "right.top",
+            "count": 41,
+            "pitch": 3.8609,
+            "hole": "slit 3",
+            "inset": 3.5,
+        }
+    ],
+    "edges": {"top": {"finish": "turned", "allowance": 12.0, "corner": "square"}},
+    "notes": ["skive from the marked line to the edge before turning: top"],
+}
+
+
+def test_the_stitches_and_the_edges_stand_in_tables(tmp_path):
+    made = lampshade()
+    made = replace(made, facts={**made.facts, **SEWN})
+    (written,) = traveller.write(job(made), tmp_path, Options())
+    (lines,) = words(written.path.read_bytes())
+    at = lines.index("stitches")
+    assert lines[at + 1 :][:6] == ["edge", "mate", "holes", "pitch", "hole", "inset"]
+    assert lines[at + 7 :][:6] == ["top", "right.top", "41", "3.861", "slit 3", "3.5"]
+    at = lines.index("edges")
+    assert lines[at + 5 :][:4] == ["top", "turned", "12", "square"]
+    assert SEWN["notes"][0] in lines
+
+
+def test_a_page_full_of_tables_leaves_the_boxes_to_sign_free(tmp_path):
+    made = bent(100)
+    facts = {
+        **made.facts,
+        "stitches": SEWN["stitches"] * 40,
+        "edges": dict.fromkeys(("start", "end", "base", "top"), SEWN["edges"]["top"]),
+        "notes": [f"note {k}" for k in range(30)],
+    }
+    checks = tuple(Check(f"check-{k}", "body", 1.0, 2.0, "mm", True) for k in range(100))
+    for number in range(30):
+        (tmp_path / f"{number}.dxf").write_bytes(b"")
+    part = replace(job(replace(made, facts=facts)), checks=checks)
+    (written,) = traveller.write(part, tmp_path, Options())
+    (page,) = pages(written.path.read_bytes())
+    text = re.findall(r"g 1 0 0 1 (\S+) (\S+) cm", page.content)
+    heights = np.array(text, dtype=float)[:, 1]
+    signed = 3 * 4 + 2  # cut, bent, inspected with three lines each, and the last line
+    assert heights[-signed] == heights[-signed:].max()
+    assert heights[-signed:].max() < heights[:-signed].min()
 
 
 def test_an_allowed_check_is_told_and_no_number_is_invented(tmp_path):

@@ -60,7 +60,9 @@ def test_a_meridian_of_a_cone_is_a_straight_line_towards_the_apex():
 
 
 @pytest.mark.parametrize(
-    "patch", [FRUSTUM, helix_tangent(), ellipse_cylinder(), slanted_pipe()], ids=str
+    "patch",
+    [FRUSTUM, helix_tangent(), ellipse_cylinder(), slanted_pipe()],
+    ids=["cone", "helix", "ellipse", "pipe"],
 )
 def test_a_drawing_keeps_its_length_and_its_derivative(patch):
     """Its length in space is that of a fine polygon, extrapolated; the derivative is the

@@ -300,7 +300,7 @@ def test_a_paper_of_ones_own_replaces_the_named_one() -> None:
         {"limits": {"min_flange": -1}},
         {"labels": {"height": 0}},
         {"dxf": {"profile": "autocad"}},
-        {"glb": {"animate": True}},
+        {"glb": {"animate": 1}},
     ],
 )
 def test_what_no_shop_has_is_refused(tables: dict[str, Any]) -> None:

@@ -178,6 +178,24 @@ def test_each_side_of_a_rectangle_moves_by_its_own_distance(kind: str) -> None:
     assert sorted(np.add(wide, [1.0, 2.0, 3.0, 4.0])) == pytest.approx(grown, rel=1e-14)
 
 
+@pytest.mark.parametrize("turn", [1e-5, 1e-3, 0.03])
+@pytest.mark.parametrize("distance", [1.0, 20.0])
+def test_a_line_and_an_arc_with_hardly_a_corner_between_them(turn: float, distance: float) -> None:
+    """The chords of both cross nowhere near the corner."""
+    start, angle = np.array([0.0, -100.0]), -0.5 * np.pi - turn
+    center = start - 100.0 * np.array([np.cos(angle), np.sin(angle)])
+    bend = shapes.arc(center, 100.0, (angle, 0.5 * np.pi))
+    end = bend.curve(bend.u[1:])[0][0]
+    corners = [end, [-80.0, end[1]], [-80.0, -100.0], start]
+    contour = (bend, *(shapes.line(a, b) for a, b in itertools.pairwise(corners)))
+    made = offset_contour(contour, [distance] * len(contour), "round")
+    area, length = enclosed_area(contour), perimeter(contour)
+    # the round corners turn by 2 pi and the hollow's turn more; its strips share a kite
+    grown = area + length * distance + 0.5 * (2.0 * np.pi + turn) * distance**2
+    kite = distance**2 * np.tan(0.5 * turn)
+    assert enclosed_area(made) == pytest.approx(grown - kite, rel=1e-7)  # of straight sides
+
+
 def test_an_allowance_on_one_side_is_a_rectangle_more() -> None:
     contour = shapes.rectangle(100, 50)
     side = perimeter(contour[:1])

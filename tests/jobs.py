@@ -1,0 +1,41 @@
+"""Small jobs that the tests of what is shown share: each folds in its own way."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from functools import cache
+from pathlib import Path
+
+import devcad
+from devcad.part import Part
+
+JOBS = {
+    "arc": 'kind = "cylinder"\nradius = 40\nsweep = 200\nlength = 30',
+    "cone": 'kind = "cone"\napex = [0, 0, 50]\n[surface.directrix]\nkind = "circle"\nradius = 30\n',
+    "helix": 'kind = "tangent"\nextent = [5, 30]\n'
+    '[surface.curve]\nkind = "helix"\nradius = 20\npitch = 40\nturns = 0.6\n',
+    "duct": 'kind = "cylinder"\ndirection = [0, 0, 1]\nlength = 50\n[surface.directrix]\n'
+    'kind = "polyline"\npoints = [[0, 0, 0], [40, 0, 0], [40, 30, 0], [0, 30, 0]]\nclosed = true\n',
+    "drilled": 'kind = "frustum"\nradius = 60\ntop_radius = 30\nheight = 50\nsweep = 150\n'
+    '[[cutout]]\nshape = "circle"\ndiameter = 14\nat_surface = [0.4, 0.5]\n'
+    '[[cutout]]\nshape = "rectangle"\nwidth = 12\nheight = 6\nat_surface = [0.7, 1.0]\n'
+    "notch = true\n",
+    "horn": 'kind = "tangent"\nextent = [5, 30]\n[surface.curve]\nkind = "helix"\nradius = 20\n'
+    'pitch = 40\nturns = 0.5\n[[cutout]]\nshape = "circle"\ndiameter = 9\n'
+    "at_surface = [0.5, 0.5]\n",
+}
+
+
+@cache
+def built(name: str, thickness: float = 0.0, tolerance: float = 0.05) -> Part:
+    """The part of a job; built once a session, as it cannot change."""
+    head = f'name = "{name}"\nthickness = {thickness}\ntolerance = {tolerance}\n'
+    text = f"{head}[surface]\n{JOBS[name]}"
+    handle, path = tempfile.mkstemp(suffix=".toml")
+    os.close(handle)
+    try:
+        Path(path).write_text(text)
+        return devcad.build(path)
+    finally:
+        Path(path).unlink()

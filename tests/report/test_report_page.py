@@ -1,0 +1,303 @@
+"""The page of a job: its numbers fold the part, its policy lets nothing else in, names are text."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+import re
+from dataclasses import replace
+from html.parser import HTMLParser
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from jobs import JOBS, built
+
+from devcad.part import Part
+from devcad.report import make_report, to_bytes
+from devcad.report.page import Row, job_page, overview_page, picture_in
+
+HOSTILE = "</script><script>alert(1)</script>\"'><img src=x onerror=alert(2)>\u2028\u202ekcab &amp;"
+
+
+class Reader(HTMLParser):
+    """The elements of a page with their attributes, and the text inside scripts and styles."""
+
+    def __init__(self, page: bytes) -> None:
+        super().__init__()
+        self.tags: list[tuple[str, dict[str, str | None]]] = []
+        self.raw: list[tuple[str, dict[str, str | None], str]] = []
+        self.text = ""
+        self._open = False
+        self.feed(page.decode("utf-8"))
+        self.close()
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append((tag, dict(attrs)))
+        self._open = tag in ("script", "style")
+        if self._open:
+            self.raw.append((tag, dict(attrs), ""))
+
+    def handle_endtag(self, tag: str) -> None:
+        self._open = False
+
+    def handle_data(self, data: str) -> None:
+        if self._open:
+            tag, attributes, text = self.raw[-1]
+            self.raw[-1] = (tag, attributes, text + data)
+        else:
+            self.text += data
+
+    def block(self, name: str) -> Any:
+        """The tree of a JSON block."""
+        (text,) = [text for _, attributes, text in self.raw if attributes.get("id") == name]
+        return json.loads(text)
+
+
+def page_of(part: Part) -> bytes:
+    return job_page(part, make_report(part, checks=part.checks))
+
+
+# --- the numbers ---------------------------------------------------------------------------
+
+
+def arrays(told: dict[str, Any]) -> list[dict[str, Any]]:
+    """The panels with their arrays read out."""
+    raw = base64.b64decode(told["data"])
+
+    def read(value: Any) -> Any:
+        stored = isinstance(value, list) and value and isinstance(value[0], str)
+        return np.frombuffer(raw, "<" + value[0], value[2], value[1]) if stored else value
+
+    return [{key: read(value) for key, value in panel.items()} for panel in told["panels"]]
+
+
+def turn(axis: Any, angle: float) -> np.ndarray:
+    """Rodrigues' formula, written again."""
+    x, y, z = np.asarray(axis, dtype=float) / np.linalg.norm(axis)
+    k = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.eye(3) + np.sin(angle) * k + (1 - np.cos(angle)) * k @ k
+
+
+def walked(panel: dict[str, Any], f: float) -> np.ndarray:
+    """The points of a panel at f from the page's own numbers: (n, 3)."""
+    angles, hinges = panel["angles"], panel["hinges"].reshape(-1, 2, 2)
+    n, anchor = len(angles) + 1, panel["anchor"]
+    size = float(np.linalg.norm(panel["turn"]))
+    r = turn(panel["turn"], size * (1 - f)) if size else np.eye(3)
+    pivot = np.append(panel["pivot"], 0.0)
+    goal = pivot + np.append(panel["shift"], 0.0)
+    place = (1 - f) * np.array(panel["place"]) + f * goal - r @ pivot
+    motions = {anchor: (r, place)}
+    for k in [*range(anchor + 1, n), *range(anchor - 1, -1, -1)]:
+        before, hinge, sign = (k - 1, k - 1, 1) if k > anchor else (k + 1, k, -1)
+        start = np.append(hinges[hinge, 0], 0.0)
+        along = np.append(hinges[hinge, 1] - hinges[hinge, 0], 0.0)
+        r, place = motions[before]
+        step = turn(along, sign * (1 - f) * angles[hinge])
+        motions[k] = (r @ step, r @ (start - step @ start) + place)
+    flat = np.column_stack([panel["flat"].reshape(-1, 2), np.zeros(len(panel["body"]))])
+    return np.array(
+        [motions[b][0] @ x + motions[b][1] for b, x in zip(panel["body"], flat, strict=True)]
+    )
+
+
+def lengths(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    corner = points[triangles.reshape(-1, 3)]
+    return np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=2)
+
+
+@pytest.mark.parametrize("name", JOBS)
+def test_the_numbers_of_the_page_fold_the_part_into_its_pattern(name: str) -> None:
+    part = built(name)
+    (panel,) = arrays(Reader(page_of(part)).block("part"))
+    start = walked(panel, 0.0)
+    size = float(np.abs(start).max())
+    for f in (0.3, 0.7, 1.0):
+        found = lengths(walked(panel, f), panel["triangles"])
+        assert np.abs(found - lengths(start, panel["triangles"])).max() < 1e-6 * size  # float32
+    mesh = part.panels[0].mesh
+    if not part.panels[0].cuts:
+        used = mesh.vertices[np.unique(mesh.triangles)]
+        apart = np.linalg.norm(used[:, None] - start[None], axis=2).min(axis=1)
+        assert apart.max() < 1e-6 * size
+    flat = walked(panel, 1.0)
+    assert np.abs(flat[:, 2]).max() < 1e-6 * size
+    xmin, ymin, xmax, ymax = part.panels[0].pattern.bbox
+    box = [*flat[:, :2].min(axis=0), *flat[:, :2].max(axis=0)]
+    np.testing.assert_allclose(box, [xmin, ymin, xmax, ymax], atol=2.5 * part.tolerance)
+
+
+def test_the_colours_know_the_curvature_between_points() -> None:
+    """On a cone c / (q + v a) is 1 / (distance to the apex x tan of the half angle)."""
+    part = built("drilled")
+    (panel,) = arrays(Reader(page_of(part)).block("part"))
+    x, y, _ = walked(panel, 0.0).T
+    radius = np.hypot(x, y)
+    found = np.abs(panel["bending"] / panel["height"])
+    cosine = 50.0 / np.hypot(50.0, 30.0)
+    np.testing.assert_allclose(found, cosine / radius, rtol=2e-3)  # of chords: the tolerance
+
+
+def test_the_regression_curve_is_the_helix_itself() -> None:
+    """A tangent surface's edge is the curve it is made from; at f = 0 its points lie there."""
+    (panel,) = arrays(Reader(page_of(built("helix"))).block("part"))
+    curve = {**panel, "flat": panel["curve"], "body": panel["curveBody"]}
+    x, y, _ = walked(curve, 0.0).T
+    assert len(x) >= 2 * (panel["rulings"] - 2)
+    np.testing.assert_allclose(np.hypot(x, y), 20.0, atol=0.05)
+
+
+def test_several_panels_lie_side_by_side() -> None:
+    part = built("arc")
+    twins = replace(part, panels=(part.panels[0], replace(part.panels[0], name="other")))
+    left, right = arrays(Reader(page_of(twins)).block("part"))
+    a, b = walked(left, 1.0), walked(right, 1.0)
+    assert b[:, 0].min() - a[:, 0].max() == pytest.approx(10.0, abs=0.1)
+    assert b[:, 1].min() == pytest.approx(a[:, 1].min(), abs=1e-3)
+
+
+# --- the policy ----------------------------------------------------------------------------
+
+
+def policy(reader: Reader) -> dict[str, str]:
+    (text,) = [
+        str(attributes["content"])
+        for tag, attributes in reader.tags
+        if tag == "meta" and attributes.get("http-equiv") == "Content-Security-Policy"
+    ]
+    return dict(part.strip().split(" ", 1) for part in text.split(";"))
+
+
+def source(text: str) -> str:
+    return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
+
+
+def overview() -> bytes:
+    rows = [Row("a", "done", link="a/index.html"), Row("b", "failed", HOSTILE)]
+    return overview_page("parts", rows)
+
+
+@pytest.mark.parametrize("page", [page_of(built("arc")), overview()], ids=["job", "overview"])
+def test_the_policy_lets_in_what_is_there_and_nothing_else(page: bytes) -> None:
+    reader = Reader(page)
+    told = policy(reader)
+    assert told["default-src"] == told["connect-src"] == told["base-uri"] == "'none'"
+    scripts = [text for tag, a, text in reader.raw if tag == "script" and "type" not in a]
+    styles = [text for tag, _, text in reader.raw if tag == "style"]
+    assert told["script-src"].split() == ([source(*scripts)] if scripts else ["'none'"])
+    assert told["style-src"] == source(*styles)
+    for tag, attributes in reader.tags:
+        assert not {"src", "style", "srcset", "action"} & set(attributes)
+        assert not [name for name in attributes if name.startswith("on")]
+        assert tag not in ("link", "iframe", "object", "embed", "base", "img", "form")
+        assert ":" not in str(attributes.get("href", ""))
+
+
+def test_no_asset_names_another_place() -> None:
+    page = page_of(built("arc")).decode()
+    found = set(re.findall(r"https?://[^\"'\s<]+", page))
+    assert found <= {"http://www.w3.org/2000/svg"}  # a name, not an address
+
+
+# --- names ---------------------------------------------------------------------------------
+
+
+def named(name: str) -> Part:
+    part = built("arc")
+    (panel,) = part.panels
+    checks = tuple(replace(check, panel=name) for check in part.checks)
+    panels = (replace(panel, name=name), replace(panel, name=f"{name}2"))
+    return replace(
+        part, name=name, panels=panels, checks=checks, description=name, part_number=name
+    )
+
+
+def test_hostile_names_are_text() -> None:
+    good, bad = Reader(page_of(named("plain"))), Reader(page_of(named(HOSTILE)))
+    assert [tag for tag, _ in good.tags] == [tag for tag, _ in bad.tags]
+    assert [sorted(a) for _, a in good.tags] == [sorted(a) for _, a in bad.tags]
+    assert bad.block("report")["job"] == HOSTILE
+    assert bad.block("part")["panels"][0]["name"] == HOSTILE
+    assert HOSTILE in bad.text
+    raw = page_of(named(HOSTILE)).decode()
+    for block in re.findall(r'<script type="application/json"[^>]*>(.*?)</script>', raw, re.S):
+        assert not set("<>\u2028\u2029") & set(block)
+
+
+def test_an_overview_takes_hostile_rows_as_text() -> None:
+    rows = [
+        Row(HOSTILE, HOSTILE, HOSTILE, link=HOSTILE),
+        Row("b", "done", link="javascript:alert(1)"),
+        Row("c", "done", link="//elsewhere/index.html"),
+        Row("d", "done", link=" data:text/html,x"),
+        Row("e", "done", link="e/index.html"),
+    ]
+    reader = Reader(overview_page(HOSTILE, rows))
+    links = [str(a["href"]) for tag, a in reader.tags if tag == "a"]
+    assert links == [HOSTILE, "e/index.html"]
+    assert reader.text.count(HOSTILE) >= 4
+    assert not [tag for tag, _ in reader.tags if tag in ("img", "script")]
+
+
+def test_an_overview_counts_and_shows_every_job() -> None:
+    picture = picture_in(page_of(built("arc")))
+    rows = [Row(f"job{k}", "failed" if k == 1 else "done", picture=picture) for k in range(3)]
+    reader = Reader(overview_page("night", rows))
+    assert "2 done, 1 failed" in reader.text
+    assert [tag for tag, _ in reader.tags].count("svg") == 3
+    assert [a["data-state"] for tag, a in reader.tags if tag == "li"] == ["done", "failed", "done"]
+
+
+# --- the rest ------------------------------------------------------------------------------
+
+
+def test_the_page_holds_the_report() -> None:
+    part = built("drilled")
+    report = make_report(part, checks=part.checks)
+    held = Reader(job_page(part, report)).block("report")
+    assert to_bytes(held) == to_bytes(report)
+
+
+def test_checks_and_files_are_told_with_their_hashes(tmp_path: Any) -> None:
+    import devcad
+
+    part = built("arc")
+    report = devcad.export(part, tmp_path, formats=["svg"])
+    reader = Reader((tmp_path / "arc" / "index.html").read_bytes())
+    for check in report["checks"]:
+        assert check["name"] in reader.text
+    (file,) = report["files"]
+    assert file["sha256"] in reader.text
+    assert ("a", {"href": "arc.svg"}) in reader.tags
+
+
+def test_equal_parts_have_equal_pages() -> None:
+    part = built("drilled", 2.0)
+    assert page_of(part) == page_of(part)
+
+
+def test_two_hundred_rulings_take_less_than_700_kb() -> None:
+    part = built("cone", 1.0, 0.002)
+    assert part.panels[0].facts["ruling_count"] >= 200
+    assert len(page_of(part)) < 700_000
+
+
+def test_the_picture_is_an_svg_without_scripts() -> None:
+    root = ElementTree.fromstring(picture_in(page_of(built("drilled"))))
+    assert root.tag == "{http://www.w3.org/2000/svg}svg"
+    assert not [e for e in root.iter() if e.tag.endswith(("script", "foreignObject"))]
+    assert picture_in(overview()) == ""
+
+
+def test_the_drawing_is_as_large_as_the_pattern() -> None:
+    part = built("drilled")
+    page = page_of(part).decode()
+    (data,) = re.findall(r'<path class="line CUT_OUTER" d="([^"]*)"', page)
+    numbers = np.array(re.findall(r"-?[\d.]+", data), dtype=float).reshape(-1, 2)
+    xmin, ymin, xmax, ymax = part.panels[0].pattern.bbox
+    np.testing.assert_allclose(numbers.min(axis=0), [xmin, -ymax], atol=0.03)
+    np.testing.assert_allclose(numbers.max(axis=0), [xmax, -ymin], atol=0.03)
+    assert f"{xmax - xmin:.2f} mm" in page
