@@ -11,6 +11,7 @@ import pytest
 import test_architecture
 import typer
 
+import devcad
 from devcad import cli, errors
 
 REPOSITORY = Path(__file__).parents[1]
@@ -114,15 +115,13 @@ def test_the_readme_python_runs(
     assert (tmp_path / "out" / "lampshade" / "lampshade.dxf").is_file()
 
 
-def test_the_picture_is_what_its_script_draws() -> None:
-    code = (REPOSITORY / "samples" / "picture.py").read_text()
-    names: dict[str, object] = {"__name__": "picture", "__file__": str(REPOSITORY / "samples")}
-    exec(compile(code, "picture.py", "exec"), names)
-    draw = names["picture"]
-    assert callable(draw)
-    drawn = draw(REPOSITORY / "samples" / "lampshade.toml")
-    shown = (REPOSITORY / "samples" / "lampshade.svg").read_text()
-    assert drawn == shown, "draw it again: python samples/picture.py"
+def test_the_pictures_are_what_their_script_draws() -> None:
+    from devcad.report.page import pictures
+
+    samples = REPOSITORY / "samples"
+    drawn = pictures(devcad.build(samples / "lampshade.toml"))
+    shown = [(samples / name).read_text() for name in ("lampshade.svg", "lampshade-unrolls.svg")]
+    assert [f"{each}\n" for each in drawn] == shown, "draw them again: python samples/picture.py"
 
 
 def test_contributing_shows_the_layers_that_the_tests_hold() -> None:

@@ -22,9 +22,9 @@ from devcad import __version__
 from devcad.export.folding import sheet_of, strip_of
 from devcad.part import Part
 from devcad.report import sections
-from devcad.report.data import part_data
+from devcad.report.data import Piece, part_data
 from devcad.report.drawing import drawing, lines_of
-from devcad.report.picture import part_picture
+from devcad.report.picture import moving_picture, part_picture
 
 SCRIPTS = ("fold.js", "shape.js", "camera.js", "paint.js", "page.js")
 SHADERS = ("surface.vert", "surface.frag", "line.vert", "line.frag")
@@ -41,11 +41,8 @@ def job_page(part: Part, report: dict[str, Any]) -> bytes:
     is cut, which differs from their flat state by less than the mesh's deviation a facet, and by
     the neutral fibre's allowance where there is one.
     """
-    strips = [strip_of(panel) for panel in part.panels]
-    pieces = [
-        None if strip is None else (strip, sheet_of(panel, strip))
-        for panel, strip in zip(part.panels, strips, strict=True)
-    ]
+    pieces = _pieces(part)
+    strips = [None if piece is None else piece[0] for piece in pieces]
     lines = lines_of(part)
     pattern, layers = drawing(part, strips, lines)
     picture = part_picture(part, pieces, lines)
@@ -68,6 +65,21 @@ def job_page(part: Part, report: dict[str, Any]) -> bytes:
         f"<script>{_script()}</script>",
     ]
     return _document(part.name, body, script=_script())
+
+
+def pictures(part: Part) -> tuple[str, str]:
+    """Two SVG texts: the part beside its patterns, and the part that unrolls and closes again."""
+    pieces = _pieces(part)
+    return part_picture(part, pieces, lines_of(part)), moving_picture(part, pieces)
+
+
+def _pieces(part: Part) -> list[Piece | None]:
+    """Of each panel the strip that folds and the sheet on it, None where there is none."""
+    strips = [strip_of(panel) for panel in part.panels]
+    return [
+        None if strip is None else (strip, sheet_of(panel, strip))
+        for panel, strip in zip(part.panels, strips, strict=True)
+    ]
 
 
 @dataclass(frozen=True, slots=True)

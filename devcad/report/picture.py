@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from html import escape
 
 import numpy as np
@@ -22,6 +23,11 @@ AZIMUTH, ELEVATION = -65.0, 24.0
 NEARER = 0.004  # of the part: what puts a ruling before the faces beside it
 MOST = 6000
 """Triangles that a picture shows: of a part with more, only the patterns."""
+FRAMES, SECONDS = 16, 4.0
+"""Pictures of a moving one, and how long it takes there and back."""
+
+_Seen = tuple[Array, list[str], Array]
+"""Triangles (m, 3, 3) as the camera sees them, their colours, rulings (k, 2, 3)."""
 
 
 def part_picture(
@@ -32,64 +38,125 @@ def part_picture(
     patterns. Farther faces are drawn first, which is right wherever faces do not reach through one
     another."""
     shifts = pattern_shifts(part)
-    there = [(*piece, shift) for piece, shift in zip(pieces, shifts, strict=True) if piece]
-    camera = _axes(AZIMUTH, ELEVATION)
-    small = sum(len(sheet.triangles) for _, sheet, _ in there) <= MOST
-    seen = [_seen(*each, f, camera) for each in there] if small else []
-    corners = [points.reshape(-1, 3)[:, :2] for points, *_ in seen]
+    seen = _stages(part, pieces, [f])[0]
     outlines = [
         [line.points + shift for line in drawn if line.closed]
         for drawn, shift in zip(lines, shifts, strict=True)
     ]
-    part_box = _box(np.concatenate(corners)) if corners else (np.zeros(2), np.zeros(2))
-    flat_box = _box(np.concatenate([loop for loops in outlines for loop in loops]))
+    part_box = _box([points for points, *_ in seen])
+    flat_box = _box([loop for loops in outlines for loop in loops])
     wide, tall = part_box[1][0] + flat_box[1][0], max(part_box[1][1], flat_box[1][1])
     scale = min((WIDTH - 2 * MARGIN - GAP) / wide, (TALLEST - 2 * MARGIN) / tall)
     height = 2 * MARGIN + scale * tall
+    flat = _Place(flat_box, scale, MARGIN + scale * part_box[1][0] + GAP, height)
+    outline = ["".join(f"{flat(loop)}Z" for loop in loops) for loops in outlines]
+    return _document(
+        f"{part.name} and its flat pattern",
+        height,
+        [
+            *_faces(seen, _Place(part_box, scale, MARGIN, height)),
+            "</g>",
+            f'<g fill="{_colour(FRONT)}" fill-rule="evenodd" stroke="#2b333b" stroke-width="1.2">',
+            *(f'<path d="{data}"/>' for data in outline),
+        ],
+    )
 
-    def placed(points: Array, box: tuple[Array, Array], left: float) -> str:
-        """SVG coordinates of points (k, 2) of a drawing that stands at ``left``, centred."""
-        low, extent = box
-        x = left + scale * (points[:, 0] - low[0])
-        y = height / 2 + scale * (extent[1] / 2 - (points[:, 1] - low[1]))
+
+def moving_picture(part: Part, pieces: list[Piece | None]) -> str:
+    """The SVG text of the part that unrolls and closes again, without a script: ``FRAMES`` pictures
+    of it, each shown in its time."""
+    turns = np.pi * np.arange(FRAMES) / (FRAMES - 1)
+    stages = _stages(part, pieces, (0.5 - 0.5 * np.cos(turns)).tolist())
+    box = _box([points for seen in stages for points, *_ in seen])
+    scale = min((WIDTH - 2 * MARGIN) / box[1][0], (TALLEST - 2 * MARGIN) / box[1][1])
+    height = 2 * MARGIN + scale * box[1][1]
+    place = _Place(box, scale, 0.5 * (WIDTH - scale * box[1][0]), height)
+    body: list[str] = []
+    for k, seen in enumerate(stages):
+        body += [
+            f'<g display="{"none" if k else "inline"}">{_shown(k)}',
+            *_faces(seen, place),
+            "</g>",
+        ]
+    return _document(f"{part.name} unrolls", height, body)
+
+
+def _shown(k: int) -> str:
+    """The animation of picture k, shown in step k and, on the way back, 2 FRAMES - 1 - k."""
+    steps, values = (
+        [0, k, k + 1, 2 * FRAMES - 1 - k, 2 * FRAMES - k],
+        "none;inline;none;inline;none",
+    )
+    if k == 0:
+        steps, values = steps[1:-1], "inline;none;inline"
+    times = ";".join(f"{step / (2 * FRAMES):.6g}" for step in steps)
+    return (
+        f'<animate attributeName="display" dur="{SECONDS:g}s" repeatCount="indefinite"'
+        f' calcMode="discrete" values="{values}" keyTimes="{times}"/>'
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Place:
+    """Where a drawing of a ``box`` stands: px per mm, its left side, the picture's height."""
+
+    box: tuple[Array, Array]
+    scale: float
+    left: float
+    height: float
+
+    def __call__(self, points: Array) -> str:
+        """The path of points (k, 2), the drawing in the middle of the height."""
+        low, extent = self.box
+        x = self.left + self.scale * (points[:, 0] - low[0])
+        y = self.height / 2 + self.scale * (extent[1] / 2 - (points[:, 1] - low[1]))
         pairs = zip(x.tolist(), y.tolist(), strict=True)
         return "M" + "L".join(f"{a:.1f} {b:.1f}" for a, b in pairs)
 
-    items: list[tuple[float, str]] = []
-    for points, fills, rulings in seen:
-        depth = points[..., 2].mean(axis=1)
-        near = rulings[..., 2].mean(axis=1) + NEARER * float(np.abs(part_box[1]).max())
-        for z, face, fill in zip(depth.tolist(), points[..., :2], fills, strict=True):
-            data = placed(face, part_box, MARGIN)
-            items.append((z, f'<path d="{data}Z" fill="{fill}" stroke="{fill}"/>'))
-        for z, line in zip(near.tolist(), rulings[..., :2], strict=True):
-            items.append((z, f'<path d="{placed(line, part_box, MARGIN)}"/>'))
-    # rounded, so that ties fall the same way on every machine
-    items.sort(key=lambda item: round(item[0], 6))
-    right = MARGIN + scale * part_box[1][0] + GAP
-    flat = ["".join(f"{placed(loop, flat_box, right)}Z" for loop in loops) for loops in outlines]
+
+def _document(title: str, height: float, body: list[str]) -> str:
     return "\n".join(
         [
             f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH:.0f} {height:.0f}"'
             f' width="{WIDTH:.0f}" height="{height:.0f}" role="img">',
-            f"<title>{escape(part.name)} and its flat pattern</title>",
+            f"<title>{escape(title)}</title>",
             f'<rect width="{WIDTH:.0f}" height="{height:.0f}" rx="8" fill="#fff"/>',
             '<g stroke-width="0.4" stroke-linejoin="round" fill="none" stroke="#44505c">',
-            *(text for _, text in items),
-            "</g>",
-            f'<g fill="{_colour(FRONT)}" fill-rule="evenodd" stroke="#2b333b" stroke-width="1.2">',
-            *(f'<path d="{data}"/>' for data in flat),
+            *body,
             "</g>",
             "</svg>",
         ]
     )
 
 
+def _stages(part: Part, pieces: list[Piece | None], stages: list[float]) -> list[list[_Seen]]:
+    """What the camera sees of each panel, unrolled by each of ``stages``."""
+    shifts = pattern_shifts(part)
+    there = [(*piece, shift) for piece, shift in zip(pieces, shifts, strict=True) if piece]
+    small = sum(len(sheet.triangles) for _, sheet, _ in there) <= MOST
+    camera = _axes(AZIMUTH, ELEVATION)
+    return [[_seen(*each, f, camera) for each in there] if small else [] for f in stages]
+
+
+def _faces(panels: list[_Seen], place: _Place) -> list[str]:
+    """The paths of faces and rulings, the farthest first."""
+    size = float(np.abs(place.box[1]).max())
+    items: list[tuple[float, str]] = []
+    for points, fills, rulings in panels:
+        depth = points[..., 2].mean(axis=1)
+        near = rulings[..., 2].mean(axis=1) + NEARER * size
+        for z, face, fill in zip(depth.tolist(), points[..., :2], fills, strict=True):
+            items.append((z, f'<path d="{place(face)}Z" fill="{fill}" stroke="{fill}"/>'))
+        for z, line in zip(near.tolist(), rulings[..., :2], strict=True):
+            items.append((z, f'<path d="{place(line)}"/>'))
+    # rounded, so that ties fall the same way on every machine
+    return [text for _, text in sorted(items, key=lambda item: round(item[0], 6))]
+
+
 def _seen(
     strip: Hinged, sheet: Sheet, shift: tuple[float, float], f: float, camera: Array
-) -> tuple[Array, list[str], Array]:
-    """The triangles (m, 3, 3) of a panel as the camera sees them, their colours, and its rulings
-    (k, 2, 3)."""
+) -> _Seen:
+    """A panel, unrolled by f."""
     points = moved(motions(strip, f, shift)[sheet.body], sheet.flat) @ camera.T
     corner = points[sheet.triangles]
     normal = rows_cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
@@ -108,8 +175,13 @@ def _axes(azimuth: float, elevation: float) -> Array:
     return np.stack([right, np.cross(viewer, right), viewer])
 
 
-def _box(points: Array) -> tuple[Array, Array]:
-    """The lower left corner and the size of points (k, 2)."""
+def _box(groups: list[Array]) -> tuple[Array, Array]:
+    """The lower left corner and the size of points (..., 2 or more); nothing has none."""
+    points = np.concatenate(
+        [np.zeros((0, 2)), *(g.reshape(-1, g.shape[-1])[:, :2] for g in groups)]
+    )
+    if not len(points):
+        return np.zeros(2), np.zeros(2)
     low = points.min(axis=0)
     return low, points.max(axis=0) - low
 
