@@ -241,7 +241,8 @@ def _panel(spec: PanelSpec, how: Making) -> tuple[Panel, Blank, list[Check]]:
         facts["area"] = sheet_area(middle, cuts)  # bent to the end, whatever ``bend`` is
     figures = {**spec.figures, **strain(checks), **neutral_figures(blank)}
     figures |= brake.figures if brake else {}
-    facts |= {"figures": figures, "notes": [*spec.notes, *reliefs]}
+    told = brake.notes if brake else ()
+    facts |= {"figures": figures, "notes": [*spec.notes, *reliefs, *told]}
     if spec.rail_fit is not None:
         facts |= rail_facts(spec.rail_fit, spec.mm_per_unit)
     return replace(panel, facts=facts), blank, checks
@@ -299,7 +300,8 @@ def _stuff(spec: PanelSpec, how: Making) -> _Stuff:
             refuse_thick_apex,
         )
 
-        refuse_creases(middle, shapes, layers[-1])
+        if how.bends is None:  # off the brake faces are plane
+            refuse_creases(middle, shapes, layers[-1])
         refuse_thick_apex(shapes, apex)
         refuse_layers_apart(middle, layers)
         checks = prove_surface(spec.name, middle, layers, reaches_apex=any(apex), fit=spec.rail_fit)

@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from devcad import __version__, console, words
+from devcad import __version__, clibatch, console, words
+from devcad.arguments import Allow, AsJson, Jobs, Out, Pipeline
 from devcad.errors import DevcadError, JobError
 from devcad.interrupts import Interrupts
 from devcad.outcomes import work_through, work_together
@@ -46,17 +47,6 @@ Examples:
 Exit codes: 0 done, 2 job file or usage, 3 geometry or a failed check,
 4 limits, 5 files, 70 a bug of ours.""",
 )
-
-Jobs = Annotated[list[str], typer.Argument(metavar="JOB", help="Job files.")]
-Pipeline = Annotated[
-    str | None, typer.Option(metavar="NAME", help="Recipe; devcad list pipelines names them.")
-]
-Allow = Annotated[
-    list[str] | None,
-    typer.Option(metavar="CHECK", help="Let a failed check pass; the report says so."),
-]
-AsJson = Annotated[bool, typer.Option("--json", help="Print one array of reports.")]
-Out = Annotated[str, typer.Option("-o", "--out", metavar="OUT", help="Folder.")]
 
 
 @app.callback(invoke_without_command=True)
@@ -146,6 +136,26 @@ def check(
         return check_lines(report)
 
     return work_through(jobs, work, as_json, lines, context.obj)
+
+
+@app.command()
+def view(
+    context: typer.Context,
+    job: Annotated[str, typer.Argument(metavar="JOB", help="A job file.")],
+    pipeline: Pipeline = None,
+    allow: Allow = None,
+    browser: Annotated[bool, typer.Option(help="Open the page, or only print its path.")] = True,
+) -> int:
+    """Build a job and open its page: the part, how it folds, its pattern, its checks."""
+    allowed = words.checks(allow)
+    words.recipe(pipeline)
+
+    def work(job: Job, progress: Progress) -> dict[str, Any]:
+        from devcad.showing import show
+
+        return {"page": show(job, progress, pipeline=pipeline, allow=allowed, browser=browser)}
+
+    return work_through([job], work, False, lambda told: [told["page"]], context.obj)
 
 
 @app.command(
@@ -307,6 +317,10 @@ def new(
         words.usage(f'there is no surface kind "{kind}"', kind, kinds)
     console.say(template(kind).rstrip("\n"))
     return 0
+
+
+for _command, _examples in clibatch.COMMANDS.items():
+    app.command(epilog=_examples)(_command)
 
 
 def run(arguments: Sequence[str]) -> int:

@@ -66,10 +66,19 @@ def _sewn(part: Part, shop: ShopSettings, edges: Edges, reference: str) -> Stitc
     """The stitch holes of all seams, and the places of their notches."""
     if not part.seams or (shop.stitch is None and shop.notches is None):
         return Stitched()
-    every = shop.notches.every if shop.notches else 0
-    stitch = shop.stitch or Stitch()
+    every, pair = 0, 0.0
+    if shop.notches is not None:
+        from devcad.shop.notches import beside
+
+        every, pair = shop.notches.every, beside(shop.notches)
     return stitched(
-        part, edges, stitch, reference=reference, every=every, pierced=shop.stitch is not None
+        part,
+        edges,
+        shop.stitch or Stitch(),
+        reference=reference,
+        every=every,
+        pair=pair,
+        pierced=shop.stitch is not None,
     )
 
 
@@ -106,7 +115,7 @@ def _finished(
     if holes:
         refuse_clashes(pattern)
     pattern, notes = _drawn(pattern, panel, part, shop, finishes)
-    done = replace(panel, pattern=pattern)
+    done = replace(panel, pattern=pattern, surface_area=panel.area)
     mass = panel.facts.get("mass_g")
     facts |= {
         **pattern_facts(pattern),

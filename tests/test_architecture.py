@@ -23,14 +23,16 @@ LAYERS: list[set[str]] = [
     {"part"},
     {"shop", "simulate"},
     {"facts", "proofs", "seams"},
-    {"assemble"},
+    {"assemble", "finishing"},
     {"export", "importers"},
     {"job"},
     {"report"},
     {"pipeline"},
-    {"batch", "interop"},
     {"console", "interrupts"},
+    {"batch", "interop", "showing"},
     {"outcomes", "words"},
+    {"batching", "arguments"},
+    {"clibatch"},
     {"cli"},
     {"__main__"},
 ]
@@ -50,10 +52,12 @@ LIBRARIES: dict[str, list[str]] = {
     "trimesh": ["mesh/", "importers/mesh"],
     "manifold3d": ["mesh/"],
     "xatlas": ["export/atlas.py"],
-    "typer": ["cli.py"],
+    "typer": ["cli.py", "clibatch.py", "arguments.py"],
     "click": ["cli.py"],
     "rich": ["report/progress.py"],
     "build123d": ["interop.py"],
+    "distributed": ["batch/cluster.py"],
+    "fsspec": ["batch/remote.py"],
 }
 """Library -> the beginnings of the paths under devcad/ that may import it."""
 
@@ -66,6 +70,8 @@ LAZY = {
     "HersheyFonts",
     "xatlas",
     "spyrrow",
+    "distributed",
+    "fsspec",
 }
 """Libraries imported inside functions only: most jobs do without them."""
 
@@ -148,7 +154,8 @@ def test_every_library_that_is_imported_is_declared() -> None:
         "HersheyFonts": "Hershey-Fonts",
     }
     project = tomllib.loads((REPOSITORY / "pyproject.toml").read_text())["project"]
-    declared = {line.split(">")[0] for line in project["dependencies"]}
+    lines = [*project["dependencies"], *project["optional-dependencies"]["cluster"]]
+    declared = {line.split(">")[0] for line in lines}
     used = {
         distribution.get(top, top)
         for path in SOURCES
@@ -175,6 +182,11 @@ HEAVY = (
     "xatlas",
     "reportlab",
     "spyrrow",
+    "distributed",
+    "fsspec",
+    "dask",
+    "sqlite3",
+    "multiprocessing",
 )
 
 

@@ -110,7 +110,7 @@ def _foot(strip: Strip, side: int, point: Array, size: float) -> float | None:
         rate = float(np.diff(strip.course(place + 1e-6 * span * np.array([-1.0, 1.0])))[0])
         step = float(off @ way) / speed * 2e-6 * span / rate
         place -= step
-        if abs(step) <= 1e-16 * span:
+        if abs(step) <= 1e-12 * span:  # the next one is below rounding
             break
         if not s[0] + 1e-6 * span < place < s[-1] - 1e-6 * span:
             return None

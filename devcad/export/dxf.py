@@ -341,7 +341,7 @@ def _contours(space: Any, panel: Panel, how: Style, path: Path, exact: bool) -> 
     words = ("TEXT", "INSERT")
     left = {
         layer: [e for e in space if e.dxf.layer == layer and e.dxftype() not in words]
-        for layer in layers
+        for layer in dict.fromkeys(layers)
     }
     outer = left[layers[-1]]
     holes = len(pattern.holes) if layers[-1] in layers[:-1] else 0

@@ -17,7 +17,7 @@ from devcad.errors import DevcadError, FileError
 
 AT_FDCWD, RENAME_EXCHANGE = -100, 2  # linux/fcntl.h, linux/fs.h
 ATTEMPTS = 16  # another process may publish the same folder between two of our steps
-REPORT = "report.json"
+REPORT, PAGE = "report.json", "index.html"
 LITTER = {".DS_Store", "Thumbs.db", "desktop.ini"}
 """What file managers put into every folder that is looked at."""
 
@@ -122,6 +122,20 @@ def _move_in(staging: Path, out: Path, listing: str) -> None:
     _synchronise_entries(out)
 
 
+def sweep(out: Path) -> None:
+    """Remove what killed processes left in OUT: staging folders of any name, nobody's now.
+
+    The lock on OUT keeps those that have just been made and are not locked themselves yet.
+    """
+    with suppress(OSError):
+        outer = _lock(out)
+        try:
+            if outer is not None:
+                _sweep_like(out, re.compile(r"\..+-[0-9a-f]{16}\.part"))
+        finally:
+            _unlock(outer)
+
+
 def publish_file(out: Path, name: str, data: bytes) -> Path:
     """Write OUT/name, whole or not at all, in place of an earlier one; returns its path.
 
@@ -221,7 +235,8 @@ def _unlisted(target: Path) -> list[str]:
     """The entries of a folder that its report does not list; a bad report lists nothing."""
     with suppress(FileNotFoundError):
         entries = sorted(target.iterdir())
-        listed = _listed(target / REPORT, REPORT) | LITTER
+        listed = _listed(target / REPORT, REPORT)
+        listed |= LITTER | ({PAGE} if listed else set())  # the page stands beside a good report
         return [path.name for path in entries if path.name not in listed or path.is_dir()]
     return []
 
@@ -263,9 +278,15 @@ def _staging(out: Path, name: str) -> Iterator[Path]:
 
 def _sweep(out: Path, name: str) -> None:
     """Remove the staging folders of this name whose process has died: nobody locks them."""
-    pattern = re.compile(rf"\.{re.escape(name)}-[0-9a-f]{{16}}\.part")
-    for path in out.iterdir():
-        if not pattern.fullmatch(path.name) or path.is_symlink():
+    _sweep_like(out, re.compile(rf"\.{re.escape(name)}-[0-9a-f]{{16}}\.part"))
+
+
+def _sweep_like(out: Path, pattern: re.Pattern[str]) -> None:
+    """Remove the staging folders with such names whose process has died."""
+    with os.scandir(out) as entries:  # no path for each of 10 000 parts: that takes 20 ms
+        found = [out / one.name for one in entries if pattern.fullmatch(one.name)]
+    for path in found:
+        if path.is_symlink():
             continue
         lock = _lock_at_once(path)
         if lock is not None:

@@ -23,6 +23,10 @@ SHARPENINGS = 8
 """Steps from the least squares to the least of the largest distances."""
 STEPS = 12
 """Newton's steps to the foot of a perpendicular."""
+SAME = 1e-12
+"""Relative: distances that differ by less are one, as on both sides of a joint."""
+SHORTER = 0.125
+"""Of a step that led farther away the next one."""
 
 
 def misfit(
@@ -124,27 +128,42 @@ def _least_largest(rows: Array, away: Array, reach: float) -> Array:
 
 def feet(chain: Chain, points: Array, near: Rulings) -> Rulings:
     """The rulings on which the feet of points (n, 3) on a chain lie, each looked for from the
-    ruling ``near`` to it (n,) and held at the chain's ends."""
-    patch, t = near.patch.copy(), near.t.copy()
-    last = len(chain.patches) - 1
-    domains = np.array([p.domain for p in chain.patches])
+    ruling ``near`` to it (n,) and held at the chain's ends. A step that leads farther away, as
+    beside a regression curve, is made shorter."""
+    best, distance, step = near, np.full(len(points), np.inf), np.zeros(len(points))
+    tried = near
     for _ in range(STEPS):
-        frame = _frames(chain, Rulings(patch, t))
+        frame = _frames(chain, tried)
         away = points - frame.c0
-        v, height = rows_dot(away, frame.e), rows_dot(away, frame.n)
-        v = np.clip(v, frame.v_from, frame.v_to)
-        width = frame.q + frame.a * v - frame.c * height
+        along, height = rows_dot(away, frame.e), rows_dot(away, frame.n)
+        v = np.clip(along, frame.v_from, frame.v_to)
         ahead = rows_dot(away, frame.m)
-        low, high = domains[patch].T
+        found = np.sqrt((along - v) ** 2 + ahead**2 + height**2)
+        closer = found <= distance * (1.0 + SAME)
+        width = frame.q + frame.a * v - frame.c * height
         with np.errstate(all="ignore"):  # where nothing bends a step may have no bound
-            step = np.nan_to_num(np.where(width > 0.0, ahead / width, 0.0))
-        aim = t + np.clip(step, -0.25 * (high - low), 0.25 * (high - low))
-        over, under = (aim > high) & (t == high), (aim < low) & (t == low)
-        t = np.clip(aim, low, high)
-        on, back = over & (patch < last), under & (patch > 0)
-        patch = patch + on - back
-        t = np.where(on, domains[patch, 0], np.where(back, domains[patch, 1], t))
-    return Rulings(patch, t)
+            newton = np.nan_to_num(np.where(width > 0.0, ahead / width, 0.0))
+        distance = np.where(closer, found, distance)
+        step = np.where(closer, newton, SHORTER * step)
+        best = Rulings(np.where(closer, tried.patch, best.patch), np.where(closer, tried.t, best.t))
+        tried, step = _advanced(chain, best, step)
+    return best
+
+
+def _advanced(chain: Chain, at: Rulings, step: Array) -> tuple[Rulings, Array]:
+    """The rulings a step (n,) further, at most to the next joint, over it from there on; and the
+    steps, at most a quarter of a patch."""
+    domains = np.array([p.domain for p in chain.patches])
+    low, high = domains[at.patch].T
+    step = np.clip(step, -0.25 * (high - low), 0.25 * (high - low))
+    aim = at.t + step
+    over, under = (aim > high) & (at.t == high), (aim < low) & (at.t == low)
+    t = np.clip(aim, low, high)
+    on, back = over & (at.patch < len(domains) - 1), under & (at.patch > 0)
+    patch = at.patch + on - back
+    return Rulings(
+        patch, np.where(on, domains[patch, 0], np.where(back, domains[patch, 1], t))
+    ), step
 
 
 def _samples(

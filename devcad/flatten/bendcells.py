@@ -19,6 +19,8 @@ MOST_BENDS = 500
 """Bends of a panel: more are not pressed, it is rolled."""
 STEEPEST = np.radians(150.0)
 """The most that one bend may turn."""
+MOST_HALVES = 16
+"""Into so many parts a cell beside a change of sign is divided at most."""
 QUARTERS = 4
 """Steps from bend to bend, and through a cell, at which the smooth sheet is looked at."""
 
@@ -59,7 +61,8 @@ def by_count(parts: Sequence[Stretch], count: int) -> list[int]:
     least = by_angle(parts, STEEPEST)
     if count < sum(least):
         raise GeometryError(
-            f"bends: {count} bend lines are too few, none turns by more than 150 deg or to both sides",
+            f"bends: {count} bend lines are too few: none turns by more than 150 deg, or to both "
+            "sides",
             value=count,
             limit=sum(least),
             remedy=f"give count = {sum(least)} or more",
@@ -73,35 +76,47 @@ def by_count(parts: Sequence[Stretch], count: int) -> list[int]:
 
 def by_length(smooth: Sheet, parts: Sequence[Stretch], longest: float) -> list[Array]:
     """The borders of the fewest cells of one length for each stretch such that no cell, and no
-    flat between two bends of a stretch, or of two that meet, is longer than ``longest`` mm on the
-    longer edge of the pattern."""
+    flat between two bends, is longer than ``longest`` mm on the longer edge of the pattern; the
+    cells on both sides of where two stretches meet are halved for that as often as it takes.
+
+    Raises:
+        GeometryError: more bends than are pressed.
+    """
     counts = [
         _fewest(part, lambda n, part=part: _longest(smooth, part, n, longest), 1.0)  # type: ignore[misc]
         for part in parts
     ]
+    _bounded(sum(counts))
     cells = [smooth.even(part, count) for part, count in zip(parts, counts, strict=True)]
     for k, (one, other) in enumerate(pairwise(parts)):
-        meet = one.end == other.start or (
-            one.end[0] + 1 == other.start[0]
-            and one.end[1] == smooth.flat.patches[one.end[0]].domain[1]
-            and other.start[1] == smooth.flat.patches[other.start[0]].domain[0]
-            and smooth.middle.joints[one.end[0]].smooth
-        )
-        while meet and max(counts[k : k + 2]) < MOST_BENDS:
+        halves = 1
+        while _meet(smooth, one, other) and halves < MOST_HALVES:
+            last, first = 0.5 * float(cells[k][-2] + 1.0), 0.5 * float(cells[k + 1][1])
             ends = [
                 smooth.along(smooth.places(part, np.array([share])))[0]
-                for part, share in (
-                    (one, 0.5 * float(cells[k][-2] + 1.0)),
-                    (other, 0.5 * float(cells[k + 1][1])),
-                )
+                for part, share in ((one, last), (other, first))
             ]
             if (ends[1] - ends[0]).max() <= longest * (1.0 + 1e-9):
                 break
-            for i in (k, k + 1):
-                counts[i] += 1
-                cells[i] = smooth.even(parts[i], counts[i])
-    _bounded(sum(counts))
+            halves *= 2
+            before = smooth.even(one, counts[k] * halves)[-2]
+            after = smooth.even(other, counts[k + 1] * halves)[1]
+            cells[k] = np.insert(cells[k], -1, before)
+            cells[k + 1] = np.insert(cells[k + 1], 1, after)
     return cells
+
+
+def _meet(smooth: Sheet, one: Stretch, other: Stretch) -> bool:
+    """Whether a stretch ends where the next begins, without a crease."""
+    if one.end == other.start:
+        return True
+    patches, number = smooth.flat.patches, one.end[0]
+    return (
+        number + 1 == other.start[0]
+        and one.end[1] == patches[number].domain[1]
+        and other.start[1] == patches[number + 1].domain[0]
+        and smooth.middle.joints[number].smooth
+    )
 
 
 def by_chord(smooth: Sheet, parts: Sequence[Stretch], chord: float) -> list[int]:

@@ -11,14 +11,19 @@ from devcad.geometry.taylor import Array
 
 PARTS = 8
 """Steps of a polygon between two samples of a traced edge."""
+STRAIGHT = 1e-12
+"""rad; an edge whose tangents differ by no more is a straight line."""
 
 
 def places(edge: Edge, resolution: float) -> Array:
     """Parameters of an edge in the order of its run: traced to ``resolution`` (mm), so that no
-    wave is missed, and eight steps between; of a ruling its ends."""
+    wave is missed, and eight steps between; of a ruling or another straight line its ends."""
     if edge.name in ("start", "end"):
         return edge.u
-    u = trace(edge, resolution).u
+    traced = trace(edge, resolution)
+    if np.abs(traced.tangents - traced.tangents[0]).max() < STRAIGHT:
+        return edge.u[[0, -1]]
+    u = traced.u
     between = u[:-1, None] + np.diff(u)[:, None] * (np.arange(PARTS) / PARTS)
     return np.append(between.ravel(), u[-1])
 

@@ -13,6 +13,7 @@ from devcad.flatten.images import TrackImage
 from devcad.flatten.neutral import Fibre
 from devcad.flatten.pattern import Pattern
 from devcad.flatten.polygons import cross, polygon, winding
+from devcad.flatten.rings import twice_area
 from devcad.geometry import chebyshev
 from devcad.geometry.chain import Chain
 from devcad.geometry.patch import Patch
@@ -192,7 +193,8 @@ def _beside(hole: Array) -> Array:
     """A point just inside a hole, on the right of its first side, (2,)."""
     start, end = hole[:2]
     right = np.array([1.0, -1.0]) * (end - start)[::-1]
-    return np.asarray(0.5 * (start + end) + 1e-3 * right)
+    narrow = abs(twice_area(hole - start)) / float(right @ right)  # of a sliver, its width
+    return np.asarray(0.5 * (start + end) + 1e-3 * min(1.0, narrow) * right)
 
 
 def _crossing_area(contours: list[Array]) -> float:

@@ -33,7 +33,8 @@ def refuse_creases(chain: Chain, shapes: tuple[Shape, ...], distance: float) -> 
                 f"a crease of {angle:.4g} deg at t = {t:.6g} in a sheet with thickness, between "
                 "faces that are not plane",
                 value=angle,
-                remedy="round it with corner_radius, or give the part no thickness",
+                remedy="round it with corner_radius or bends.inside_radius, or give the part no "
+                "thickness",
             )
         if abs(joint.angle) > STEEPEST_MITRE:
             raise GeometryError(

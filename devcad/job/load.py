@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
@@ -20,6 +20,7 @@ from devcad.geometry.taylor import Array
 from devcad.importers.files import decode, inside, read_bytes
 from devcad.importers.table import parse_points
 from devcad.importers.toml import parse_toml
+from devcad.job.changes import Change, put, told
 from devcad.job.invalid import below, problems, raise_all, shown, unknown_kind
 from devcad.job.recipe import RecipeTable
 from devcad.job.tables import EdgesTable, JobTable, MetaTable, PanelTable, PlaceTable
@@ -68,8 +69,9 @@ class Job:
     """A job file, checked. Lengths are mm; only the surfaces wait for ``mm_per_unit``.
 
     ``single`` says that it has [surface] and not [[panel]]. ``path`` is as the user gave it.
-    ``sha256`` is that of the job file's bytes followed by those of the files it names, in their
-    order, drawings last and each once. ``pipeline`` None leaves the choice to the caller.
+    ``sha256`` is that of the job file's bytes, of what a list changes in it, and of the files it
+    names, in their order, drawings last and each once. ``pipeline`` None leaves the choice to
+    the caller.
     """
 
     name: str
@@ -89,20 +91,27 @@ class Job:
     seams: tuple[Seam, ...] = ()
 
 
-def load(path: str | Path) -> Job:
-    """Read and check a job file.
+def load(
+    path: str | Path, changes: Sequence[Change] = (), *, folder: str | Path | None = None
+) -> Job:
+    """Read and check a job file, with other values for some of its keys.
+
+    The files that it names lie in ``folder``, the job file's own where there is none given.
 
     Raises:
         JobError: syntax, an unknown or missing key, a value outside its domain, a file outside
         the job's folder; LimitError: too large or too deep; FileError: missing, unreadable, not
         UTF-8. Several problems come as one InvalidJob.
     """
-    tree, digest = read_tree(path)
+    tree, digest = read_tree(path, changes, folder=folder)
     return job_of(tree, str(path), digest)
 
 
-def read_tree(path: str | Path) -> tuple[dict[str, Any], str]:
-    """The tables of a job file, what the files that it names say in them; and its ``sha256``.
+def read_tree(
+    path: str | Path, changes: Sequence[Change] = (), *, folder: str | Path | None = None
+) -> tuple[dict[str, Any], str]:
+    """The tables of a job file, what the files that it names say in them; and its ``sha256``,
+    to which ``changes`` count.
 
     Raises:
         JobError, LimitError, FileError: as ``load``, where the file is no job file at all.
@@ -110,12 +119,14 @@ def read_tree(path: str | Path) -> tuple[dict[str, Any], str]:
     place = str(path)
     data = read_bytes(Path(path), limit=MAX_JOB_BYTES, place=place)
     tree = parse_toml(decode(data, place=place), place=place)
-    digest = hashlib.sha256(data)
+    put(tree, changes, place)
+    digest = hashlib.sha256(data + told(changes))
+    home = Path(path).parent if folder is None else Path(folder)
     drawings: dict[str, bytes] = {}
     for table, where in _file_tables(tree, place):
-        digest.update(_inline_points(table, Path(path).parent, where))
+        digest.update(_inline_points(table, home, where))
     for table, where in _drawing_tables(tree, place):
-        digest.update(_drawing(table, Path(path).parent, where, drawings))
+        digest.update(_drawing(table, home, where, drawings))
     _refuse_too_large(tree, place)
     return tree, digest.hexdigest()
 

@@ -160,9 +160,7 @@ def _regression(panel: Panel, strip: Hinged) -> tuple[Array, Array]:
     curved = np.repeat([shape.type in ("cone", "tangent") for shape in panel.shapes], counts)
     with np.errstate(divide="ignore", invalid="ignore"):
         share = strip.height[:, 0] / (strip.height[:, 0] - strip.height[:, 1])  # (2, cells)
-    share = np.where(
-        np.isfinite(share), share, np.nan
-    )  # where rulings run parallel
+    share = np.where(np.isfinite(share), share, np.nan)  # where rulings run parallel
     size = float(np.linalg.norm(np.ptp(strip.space.reshape(-1, 3), axis=0)))
     cells = np.arange(strip.rulings - 1)
     points = []

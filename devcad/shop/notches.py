@@ -52,15 +52,14 @@ Spot = tuple[int, float]
 class Anchor:
     """A place on the seam line of an edge at which the mate has one too.
 
-    ``point`` (2,) in the pattern and the unit ``normal`` (2,) out of the sheet; ``double`` where
-    two notches stand side by side; ``hole`` is how far outwards the middle of a stitch hole lies
-    on the normal, mm, nan where there is none, and ``clear`` how far round it nothing is drawn.
+    ``point`` (2,) in the pattern and the unit ``normal`` (2,) out of the sheet; ``hole`` is how
+    far outwards the middle of a stitch hole lies on the normal, mm, nan where there is none, and
+    ``clear`` how far round it nothing is drawn.
     """
 
     edge: str
     point: Array
     normal: Array
-    double: bool = False
     hole: float = float("nan")
     clear: float = 0.0
 
@@ -93,7 +92,9 @@ def notched(
     for anchor in anchors:
         finish = finishes.get(anchor.edge, EdgeFinish(0.0))
         if finish.allowance > 0.0 and finish.finish in ("raw", "turned"):
-            cuts += _bites(pattern.outline, anchor, notches, finish.allowance)
+            _refuse_depth(notches.depth, anchor, finish.allowance)
+            spot = _across(pattern.outline, anchor, finish.allowance)
+            cuts.append(_bite(pattern.outline, anchor, spot, notches.shape, notches.depth))
         else:
             marks += _mark(anchor, notches.depth, finish.allowance)
     if not cuts:
@@ -118,19 +119,6 @@ class _Bite:
     end: Array
 
 
-def _bites(outline: Outline, anchor: Anchor, notches: Notches, allowance: float) -> list[_Bite]:
-    """One notch at an anchor, or two side by side."""
-    depth = notches.depth
-    _refuse_depth(depth, anchor, allowance)
-    width = _width(notches.shape, depth)
-    middle = _across(outline, anchor, allowance)
-    if not anchor.double:
-        return [_bite(outline, anchor, middle, notches.shape, depth, width)]
-    half = 0.5 * APART * width
-    spots = [_walk(outline, anchor, middle, way * half) for way in (-1, 1)]
-    return [_bite(outline, anchor, spot, notches.shape, depth, width) for spot in spots]
-
-
 def _refuse_depth(depth: float, anchor: Anchor, allowance: float) -> None:
     """GeometryError for a notch that bites through half the allowance, or near a stitch hole."""
     half = OF_ALLOWANCE * allowance
@@ -152,6 +140,11 @@ def _refuse_depth(depth: float, anchor: Anchor, allowance: float) -> None:
         )
 
 
+def beside(notches: Notches) -> float:
+    """How far along a seam from its place the two notches of a pair stand, mm."""
+    return 0.5 * APART * _width(notches.shape, notches.depth)
+
+
 def _width(shape: NotchShape, depth: float) -> float:
     """How wide a notch is, mm: the bar of a T is as long as the notch is deep."""
     if shape == "slit":
@@ -159,10 +152,9 @@ def _width(shape: NotchShape, depth: float) -> float:
     return V_WIDTH * depth if shape == "V" else depth
 
 
-def _bite(
-    outline: Outline, anchor: Anchor, spot: Spot, shape: NotchShape, depth: float, width: float
-) -> _Bite:
+def _bite(outline: Outline, anchor: Anchor, spot: Spot, shape: NotchShape, depth: float) -> _Bite:
     """A notch about a spot of the outline, along the outline's normal there."""
+    width = _width(shape, depth)
     slit = min(SLIT, SLIT_SHARE * depth)
     mouth = width if shape == "V" else slit
     first, last = (_walk(outline, anchor, spot, 0.5 * way * mouth) for way in (-1, 1))

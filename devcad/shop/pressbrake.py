@@ -28,6 +28,8 @@ TRIES = 8
 """How often bends are added for the sake of the chord."""
 GAIN = 0.95
 """More bends that leave more than this of the distance do not help."""
+NEAR = 4.0
+"""Thicknesses: ends of a sheet that are further apart do not meet."""
 ISOMETRY, FOLD_BACK = 1e-9, 1e-8
 """Limits of the facets' checks, shares of the part's size."""
 
@@ -44,6 +46,7 @@ class Pressed:
     bends: tuple[BendLine, ...]
     checks: tuple[Check, ...]
     figures: dict[str, float]
+    notes: tuple[str, ...] = ()
 
     @property
     def lines(self) -> tuple[Line, ...]:
@@ -116,16 +119,36 @@ def pressed(
     }
     if blank.middle.closed:
         figures["closing_gap"] = closing_gap(full)
-    return Pressed(chain, full, tuple(zones), smooth, lines, checks, figures)
+    notes = _overlap(full, thickness)
+    return Pressed(chain, full, tuple(zones), smooth, lines, checks, figures, notes)
 
 
 def closing_gap(chain: Chain) -> float:
     """The largest distance in mm between the ends of the last ruling and of the first."""
+    return float(np.linalg.norm(_closing(chain), axis=1).max())
+
+
+def _closing(chain: Chain) -> Array:
+    """The ways from the ends of the first ruling to those of the last, (2, 3)."""
     ends = []
     for patch, t in ((chain.patches[0], 0), (chain.patches[-1], 1)):
         jet = patch.jet([patch.domain[t]], 0)
         ends.append(jet.c0[0] + np.stack([jet.v_from[0], jet.v_to[0]]) * jet.e[0])
-    return float(np.linalg.norm(ends[0] - ends[1], axis=1).max())
+    return np.asarray(ends[1] - ends[0])
+
+
+def _overlap(chain: Chain, thickness: float) -> tuple[str, ...]:
+    """A note where the ends of a thick tube that does not quite close lie in one another."""
+    way = _closing(chain)
+    if chain.closed or not np.linalg.norm(way, axis=1).max() < NEAR * thickness:
+        return ()
+    low, high = chain.patches[0].domain
+    frame = chain.patches[0].frame([np.nextafter(low, high)])
+    beside = np.abs(way @ frame.n[0]) < thickness
+    over = float(np.where(beside, way @ frame.m[0], 0.0).max())
+    if over <= ISOMETRY * float(np.abs(way).max()):
+        return ()
+    return (f"off the brake the ends overlap by {over:.3g} mm: give the surface a larger gap",)
 
 
 def _made(

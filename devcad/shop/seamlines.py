@@ -100,8 +100,16 @@ def seam_line(meeting: Meeting, panels: dict[str, Panel], faces: dict[str, Chain
     closeness = _closeness([faces[name] for name, _ in meeting.edges])
     first, second = (_moving(border(faces[name], edge, closeness)) for name, edge in meeting.edges)
     mate = match(second, first, max(closeness, 1.01 * meeting.gap))
+    names = " and ".join(".".join(edge) for edge in meeting.edges)
+    if mate is None and first.loop != second.loop:
+        raise GeometryError(
+            "stitch: one of the edges goes all round, and the other is open",
+            place=f"seam {names}",
+            value=second.length,
+            limit=first.length,
+            remedy="give both surfaces the same gap, or none",
+        )
     if mate is None:
-        names = " and ".join(".".join(edge) for edge in meeting.edges)
         raise GeometryError(
             f"stitch: the edges do not run along each other: they are up to {meeting.gap:.4g} mm "
             "apart",

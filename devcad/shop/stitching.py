@@ -22,11 +22,13 @@ from devcad.shop.notches import Anchor
 from devcad.shop.polygons import fine_polygon
 from devcad.shop.seamends import Edges, allowance_of
 from devcad.shop.seamlines import (
+    Feet,
     Flags,
     Holes,
     SeamLine,
     at_length,
     face,
+    feet,
     hole_centres,
     mates,
     seam_line,
@@ -70,6 +72,7 @@ def stitched(
     *,
     reference: str = "middle",
     every: int = 0,
+    pair: float = 0.0,
     pierced: bool = True,
 ) -> Stitched:
     """The stitch holes of all seams of a part, in the patterns as they are before allowances.
@@ -84,6 +87,8 @@ def stitched(
     Args:
         edges: by the panel's name, what is done with its edges.
         every: at every so-manieth hole there is an anchor for a notch; 0 for none.
+        pair: the first of them are two, so far along the seam before and behind their hole, mm,
+            so that mates are not turned round.
         pierced: whether there are holes; else there are only anchors.
     Raises:
         GeometryError: no room for a hole, edges that do not run along each other, holes that
@@ -113,7 +118,7 @@ def stitched(
         for panel, side in zip(line.sides, sides, strict=True):
             taken[panel.name] = np.concatenate([taken[panel.name], side.centres])
         out.append((line, found, sides))
-    return _told(out, edges, stitch, every, pierced)
+    return _told(out, edges, stitch, (every, pair), pierced)
 
 
 def _refuse_third_layers(part: Part) -> None:
@@ -180,7 +185,7 @@ def _told(
     sewn: Sequence[tuple[SeamLine, Spread, tuple[Holes, Holes]]],
     edges: Edges,
     stitch: Stitch,
-    every: int,
+    notches: tuple[int, float],
     pierced_too: bool,
 ) -> Stitched:
     """The contours, the anchors, what the report says, and the proofs."""
@@ -217,11 +222,12 @@ def _told(
                         "inset": stitch.inset,
                     }
                 )
-            if every:
-                hole = offset if pierced_too else float("nan")
-                anchors[panel.name] += _anchors(
-                    holes, found, edge, every, hole, CLEAR * _across(stitch)
-                )
+            hole = (offset if pierced_too else float("nan"), CLEAR * _across(stitch))
+            anchors[panel.name] += [
+                Anchor(edge, point, normal, *hole)
+                for there in _notched(line, side, found, holes, notches)
+                for point, normal in zip(there.points, there.normals, strict=True)
+            ]
     return Stitched(
         {name: tuple(each) for name, each in contours.items()},
         {name: tuple(each) for name, each in anchors.items()},
@@ -231,19 +237,27 @@ def _told(
     )
 
 
-def _anchors(
-    holes: Holes, found: Spread, edge: str, every: int, hole: float, clear: float
-) -> list[Anchor]:
-    """The places for notches: every so-manieth hole but the first, the last, and corners; the
-    first of them has two notches, so that mates are not turned round."""
+def _notched(
+    line: SeamLine, side: int, found: Spread, holes: Holes, notches: tuple[int, float]
+) -> list[Feet]:
+    """The places for notches on one side: every so-manieth hole but the first, the last, and
+    corners; in place of the first of them two, as far along the seam before and behind it."""
+    every, pair = notches
     numbers = [
-        k for k in range(every, len(found.s) - 1, every) if not found.corner[k] and not found.end[k]
+        k
+        for k in (range(every, len(found.s) - 1, every) if every else ())
+        if not found.corner[k] and not found.end[k]
     ]
-    points, normals = holes.feet.points, holes.feet.normals
-    return [
-        Anchor(edge, points[k], normals[k], k == numbers[0], hole=hole, clear=clear)
-        for k in numbers
-    ]
+    if not numbers:
+        return []
+    alone, at = numbers[1:] if pair else numbers, holes.feet
+    out = [Feet(at.points[alone], at.tangents[alone], at.normals[alone])]
+    if pair:
+        s = found.s[numbers[0]] + np.array([-pair, pair])
+        x = at_length(line.borders[0], np.mod(s, line.length) if line.borders[0].loop else s)
+        x = mates(line, x, np.zeros(2, dtype=bool)) if side else x
+        out.append(feet(line.sides[side], line.borders[side], x))
+    return out
 
 
 def _contours(holes: Holes, stitch: Stitch) -> list[Contour]:

@@ -118,7 +118,7 @@ def test_a_flange_is_the_distance_of_the_bend_from_the_sheet_s_end(tmp_path, fir
 
 def test_a_flange_that_is_too_short_is_refused_with_its_place(tmp_path):
     text = "thickness = 2\n[recipe.limits]\nmin_flange = 4.0\n"
-    with pytest.raises(CheckFailed, match=r"flange: the flange is 7 mm"):
+    with pytest.raises(CheckFailed, match=r"flange: the flange is 7 mm at \(0, 7\) in the pattern"):
         checks(tmp_path, text + CHANNEL.format(first=7, second=-40))
 
 

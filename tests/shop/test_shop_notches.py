@@ -12,7 +12,7 @@ from devcad.errors import GeometryError
 from devcad.flatten import shapes
 from devcad.flatten.green import bounds, enclosed_area
 from devcad.flatten.pattern import Edge, Pattern
-from devcad.shop.notches import NOTCH, NOTCH_MARK, Anchor, notched
+from devcad.shop.notches import NOTCH_MARK, Anchor, beside, notched
 from devcad.shop.polygons import fine_polygon
 from devcad.shop.settings import EdgeFinish, Notches
 
@@ -31,9 +31,9 @@ def rectangle() -> Pattern:
     return sheet(shapes.rectangle(100, 60))
 
 
-def upper(x: float, *, double: bool = False) -> Anchor:
+def upper(x: float) -> Anchor:
     """An anchor on the seam line 10 mm below the rectangle's upper side."""
-    return Anchor("top", np.array([x, 20.0]), np.array([0.0, 1.0]), double)
+    return Anchor("top", np.array([x, 20.0]), np.array([0.0, 1.0]))
 
 
 def prove_simple(pattern: Pattern) -> None:
@@ -94,14 +94,19 @@ def test_a_notch_may_reach_over_a_smooth_joint_of_two_edges() -> None:
     assert 6000.0 - made.area == pytest.approx(9.0 * V60, abs=ROUNDING)
 
 
-def test_two_notches_stand_side_by_side_at_a_double_anchor() -> None:
-    plain = rectangle()
-    made = notched(plain, [upper(5.0, double=True)], Notches(1, "V", 3.0), TEN)
-    prove_simple(made)
-    assert plain.area - made.area == pytest.approx(18.0 * V60, abs=ROUNDING)
-    x = sorted(edge.curve(edge.u[:1])[0][0, 0] for edge in made.drawings)
-    assert 0.5 * (x[0] + x[1]) == pytest.approx(5.0)
-    assert sum(edge.name == NOTCH for edge in made.outline) == 4
+@pytest.mark.parametrize(
+    ("notches", "half"),
+    [
+        (Notches(1, "V", 3.0), 6.0 * V60),
+        (Notches(1, "slit", 3.0), 0.3),
+        (Notches(1, "slit", 1.0), 0.2),
+        (Notches(1, "T", 2.0), 2.0),
+    ],
+)
+def test_between_the_two_of_a_pair_there_is_room_for_a_third(notches: Notches, half: float) -> None:
+    assert beside(notches) == pytest.approx(half)
+    pair = [upper(5.0 + side * half) for side in (-1.0, 1.0)]
+    prove_simple(notched(rectangle(), pair, notches, TEN))
 
 
 @pytest.mark.parametrize("finish", ["lap", "tab", "raw"])
@@ -109,7 +114,7 @@ def test_an_edge_that_is_not_bitten_has_a_mark_instead(finish: str) -> None:
     """Through the allowance, or inwards where there is none; the stitch hole stays free."""
     allowance = 0.0 if finish == "raw" else 10.0
     plain = rectangle()
-    anchor = Anchor("top", np.array([0.0, 20.0]), np.array([0.0, 1.0]), True, 1.0, 0.75)
+    anchor = Anchor("top", np.array([0.0, 20.0]), np.array([0.0, 1.0]), 1.0, 0.75)
     finishes = {"top": EdgeFinish(allowance, finish)}  # type: ignore[arg-type]
     made = notched(plain, [anchor], Notches(1, "V", 3.0), finishes)  # type: ignore[arg-type]
     assert made.outline == plain.outline
@@ -127,7 +132,7 @@ def test_a_notch_deeper_than_half_the_allowance_is_refused() -> None:
 
 def test_a_notch_stops_before_the_stitch_hole() -> None:
     """A hole of 1 mm at 3.5 mm from the cut: 0.75 mm round its middle stay free."""
-    anchor = Anchor("top", np.array([0.0, 20.0]), np.array([0.0, 1.0]), False, 6.5, 0.75)
+    anchor = Anchor("top", np.array([0.0, 20.0]), np.array([0.0, 1.0]), 6.5, 0.75)
     notched(rectangle(), [anchor], Notches(1, "V", 2.75), TEN)
     with pytest.raises(GeometryError, match="before a stitch hole") as caught:
         notched(rectangle(), [anchor], Notches(1, "V", 3.0), TEN)

@@ -9,13 +9,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from patches import cosine_cylinder, ellipse_cylinder, frustum
+from scipy.integrate import quad
 
 import devcad
 from devcad.errors import GeometryError
 from devcad.flatten.bendcells import by_count
 from devcad.flatten.bending import stretches
 from devcad.flatten.blank import lay_flat
+from devcad.geometry import taylor
 from devcad.geometry.chain import Chain, link
+from devcad.geometry.patch import Patch, RulingJet
+from devcad.mesh.build import volume
 from devcad.shop.bendlines import bending_order
 from devcad.shop.fibre import constant
 from devcad.shop.pressbrake import Pressed, pressed
@@ -275,3 +279,100 @@ curves = [
     assert [bend.datum[0] for bend in panel.bends] == pytest.approx(
         [50.0, *(90.0 + 20.0 * np.pi / 2 * (np.arange(4) + 0.5) / 4)], abs=1e-9
     )
+
+
+def corrugated(length: float) -> Patch:
+    """The cylinder of height 30 on x = t, y = 10 sin(t / 20), t up to ``length``."""
+
+    def field(t, order):
+        x = taylor.variable(t, order)
+        along = np.stack([x, 10.0 * taylor.sin_cos(x / 20.0)[0], np.zeros_like(x)], axis=-1)
+        up = taylor.constant_vector([0.0, 0.0, 1.0], order, t.size)
+        low, high = (taylor.constant(v, order, t.size) for v in (0.0, 30.0))
+        return RulingJet(along, up, low, high)
+
+    return Patch(field, (0.0, length))
+
+
+@pytest.mark.parametrize("longest", [4.0, 9.0, 25.0])
+def test_length_takes_little_more_than_even_pitches(longest) -> None:
+    # bends of equal angle would crowd between inflections, where little is left for those beside
+    length = 70.0 * np.pi
+    made = press([corrugated(length)], Bends(length=longest))
+    at = np.array([bend.datum[0] for bend in made.bends])
+    total = quad(lambda t: np.hypot(1.0, 0.5 * np.cos(t / 20.0)), 0.0, length, limit=200)[0]
+    assert np.diff(at).max() <= longest * (1.0 + 1e-9)
+    assert max(at[0], total - at[-1]) <= longest
+    stretches_of_it = 4
+    assert total / longest - 1.0 <= len(at) <= total / longest + 3 * stretches_of_it
+    ends = np.arctan(0.5 * np.cos(np.array([0.0, length]) / 20.0))
+    turned = sum(bend.line.angle for bend in made.bends)
+    assert abs(turned) == pytest.approx(abs(ends[1] - ends[0]), abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    "how", [Bends(count=501), Bends(angle=1e-12), Bends(chord=1e-9), Bends(length=1e-9)]
+)
+def test_more_bends_than_are_pressed_are_refused_at_once(how) -> None:
+    with pytest.raises(GeometryError, match="limit 500") as caught:
+        press([cylinder(80.0, 1.7)], how)
+    assert caught.value.value > caught.value.limit == 500
+
+
+def test_ends_that_lie_in_one_another_are_told() -> None:
+    count, radius, angle = 4, 40.0, 2.0 * np.pi + 0.01
+    ways = radius * angle / count * np.exp(1j * angle / count * np.arange(count + 1))
+    ways[[0, -1]] *= 0.5
+    how = Bends(count=count)
+    (note,) = press([cylinder(radius, angle)], how, thickness=1.0).notes
+    assert f"the ends overlap by {ways.sum().real:.3g} mm" in note
+    assert press([cylinder(radius, 2.0 * np.pi - 0.01)], how, thickness=1.0).notes == ()
+
+
+def test_a_crease_beside_what_is_pressed_is_mitred(tmp_path) -> None:
+    # the facets are plane, so that the thick sheet may have a sharp crease in its straight part
+    (tmp_path / "j.toml").write_text(
+        """
+name = "j"
+thickness = 1.5
+[recipe.bends]
+mode = "press-brake"
+count = 3
+[surface]
+kind = "cylinder"
+direction = [0, 0, 1]
+length = 30
+[surface.directrix]
+kind = "chain"
+curves = [
+  { kind = "line", from = [0, 0, 0], to = [50, 0, 0] },
+  { kind = "line", from = [50, 0, 0], to = [50, 40, 0] },
+  { kind = "circle", radius = 20, center = [30, 40, 0], sweep = 90 },
+]
+"""
+    )
+    (panel,) = devcad.build(tmp_path / "j.toml").panels
+    assert panel.mesh.watertight
+    blank = 30.0 * (50.0 + 40.0 + 20.0 * np.pi / 2)
+    assert panel.pattern.area == pytest.approx(blank, rel=1e-12)
+    assert volume(panel.mesh) == pytest.approx(1.5 * blank, rel=1e-9)
+
+
+def test_the_chord_is_seen_beside_a_regression_curve_too() -> None:
+    # the tangents of a helix from the helix on: there the surface stands still across its rulings
+    radius, rise, longest = 40.0, 60.0 / (2.0 * np.pi), 70.0
+    speed = np.hypot(radius, rise)
+
+    def field(t, order):
+        sin, cos = taylor.sin_cos(taylor.variable(t, order))
+        turn = taylor.variable(t, order)
+        helix = np.stack([radius * cos, radius * sin, rise * turn], axis=-1)
+        along = taylor.constant(rise, order, t.size)
+        tangent = np.stack([-radius * sin, radius * cos, along], axis=-1) / speed
+        ends = (taylor.constant(v, order, t.size) for v in (0.0, longest))
+        return RulingJet(helix, tangent, *ends)
+
+    made = press([Patch(field, (0.0, 2.0 * np.pi))], Bends(count=42))
+    # an arc of the sharpest radius, v tau / k at the top, rises so much over half of a bend
+    angle = abs(made.bends[0].line.angle)
+    assert made.figures["chord"] < longest * radius / rise * angle**2 / 8.0

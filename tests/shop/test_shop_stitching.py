@@ -218,6 +218,13 @@ def test_two_discs_are_sewn_evenly_all_round(part) -> None:  # type: ignore[no-u
     assert steps == pytest.approx(np.full(count, chord), abs=FIT)
 
 
+def test_a_rim_and_a_disc_with_a_gap_are_no_seam(part) -> None:  # type: ignore[no-untyped-def]
+    slit = FLOOR.replace("extent", "gap = 0.05\nextent")
+    with pytest.raises(GeometryError, match="goes all round, and the other is open") as caught:
+        stitched(part(WALL + slit + RIM), {}, Stitch())
+    assert caught.value.remedy == "give both surfaces the same gap, or none"
+
+
 def test_an_edge_is_sewn_once(part) -> None:  # type: ignore[no-untyped-def]
     again = RIM.replace('"wall.base", "floor.top"', '"floor.top", "wall.base"')
     with pytest.raises(GeometryError, match=r"the edge floor\.top is in seam 1 already") as caught:
@@ -372,11 +379,16 @@ def test_holes_that_run_into_something_are_refused(part) -> None:  # type: ignor
 
 
 def test_anchors_of_mates_are_the_same_places(part) -> None:  # type: ignore[no-untyped-def]
-    """Every tenth hole, without the first, the last and the corners; the first is double."""
-    sewn = stitched(part(BOX), {}, Stitch(), every=10, pierced=False)
+    """Every tenth hole, without the first, the last and the corners; in place of the first of
+    them two, 3 mm along the rim to either side."""
+    single = stitched(part(BOX), {}, Stitch(), every=10, pierced=False).anchors["wall"]
+    sewn = stitched(part(BOX), {}, Stitch(), every=10, pair=3.0, pierced=False)
     assert not sewn.holes
     wall, floor = sewn.anchors["wall"], sewn.anchors["floor"]
-    assert [a.double for a in wall] == [a.double for a in floor] == [True] + [False] * 8
+    assert len(wall) == len(floor) == len(single) + 1 == 10
+    places = sorted(a.point[1] for a in wall)
+    first, *others = sorted(a.point[1] for a in single)
+    assert places == pytest.approx(sorted([first - 3.0, first + 3.0, *others]), abs=FIT)
     on_rim = np.array([a.point[1] for a in wall])  # along the wall's base from its cut
     x, y = np.array([a.point for a in floor]).T
     sides = [
