@@ -1,14 +1,17 @@
-"""What a batch tells in the end: the manifest, and the cut list of all parts."""
+"""What a batch tells in the end: the manifest, the cut list of all parts, and a page of them."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from devcad.batch.orders import Order
 from devcad.batch.tasks import Record
+from devcad.export.folder import PAGE
 
 DUE = "due"
+PICTURES = 200
+"""Parts of which the overview has a picture; the others have a line and a link."""
 
 
 def manifest(records: Sequence[Record]) -> dict[str, Any]:
@@ -50,3 +53,19 @@ def cutlist(records: Sequence[Record], orders: Sequence[Order]) -> bytes:
     material, thickness = HEADER.index("material"), HEADER.index("thickness")
     rows.sort(key=lambda row: (row[material], row[thickness]))
     return to_bytes([*HEADER, DUE], rows)
+
+
+def overview(title: str, records: Sequence[Record], page: Callable[[str], bytes]) -> bytes:
+    """The page of a batch: every part with its state, a word on it, its picture and a link.
+
+    ``page`` gives the page of a part that is done, b"" where it cannot be had.
+    """
+    from devcad.report.page import Row, overview_page, picture_in
+
+    rows: list[Row] = []
+    for record in records:
+        done = record.result.exit == 0
+        picture = picture_in(page(record.name)) if done and len(rows) < PICTURES else ""
+        link = f"{record.name}/{PAGE}" if done else ""
+        rows.append(Row(record.name, record.result.state, record.result.message, link, picture))
+    return overview_page(title, rows)

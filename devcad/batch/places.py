@@ -20,7 +20,7 @@ from typing import Any
 
 from devcad.batch.tasks import File, Record, from_plain, to_plain
 from devcad.errors import FileError
-from devcad.export.folder import publish_file, sweep, unwritable
+from devcad.export.folder import PAGE, publish_file, sweep, unwritable
 
 STATE, RECORDS, FAILED_FOLDER = ".batch", ".batch/records", ".failed"
 MANIFEST, CUTLIST = "manifest.json", "cutlist.csv"
@@ -105,6 +105,13 @@ class Folder:
             (self._out / marked(MANIFEST, mark)).unlink(missing_ok=True)
         except OSError as error:
             raise unwritable(self._out, error, MANIFEST) from error
+
+    def page(self, name: str) -> bytes:
+        """The page of a part, b"" where there is none."""
+        try:
+            return (self._out / name / PAGE).read_bytes()
+        except OSError:
+            return b""
 
     def publish(self, lists: Mapping[str, bytes]) -> None:
         """Write lists, the one that says that all is complete last.

@@ -143,6 +143,10 @@ class Bucket:
         with reaching(self.address), suppress(FileNotFoundError):
             self._system.rm_file(f"{self._root}/{marked(MANIFEST, mark)}")
 
+    def page(self, name: str) -> bytes:
+        """None: a picture is not worth fetching a page for."""
+        return b""
+
     def publish(self, lists: Mapping[str, bytes]) -> None:
         """Write lists, the one that says that all is complete last."""
         with reaching(self.address):

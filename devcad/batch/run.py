@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from devcad.batch.ledger import Ledger, opened
-from devcad.batch.listing import cutlist, manifest
+from devcad.batch.listing import cutlist, manifest, overview
 from devcad.batch.making import make
 from devcad.batch.orders import Order
 from devcad.batch.places import CUTLIST, MANIFEST, Folder, marked, plain_json
@@ -25,6 +25,7 @@ from devcad.batch.prints import Reader, Words
 from devcad.batch.tasks import ATTEMPTS, DONE, FAILED, Record, Result, Task
 from devcad.batch.workers import Walls, Work, Workers
 from devcad.errors import DevcadError
+from devcad.export.folder import PAGE
 
 PATIENCE = 0.2
 """Seconds between two looks at the clock, for the progress line."""
@@ -102,6 +103,9 @@ class Store(Protocol):
     def withdraw(self, mark: str = "") -> None:
         """Remove the manifest."""
 
+    def page(self, name: str) -> bytes:
+        """The page of a part, b"" where it is not at hand."""
+
     def publish(self, lists: Mapping[str, bytes]) -> None:
         """Write the lists."""
 
@@ -152,7 +156,7 @@ def processors() -> int:
 
 
 def run(orders: Sequence[Order], settings: Settings, show: Show) -> Batch:
-    """Make what is missing or changed, and write manifest.json and cutlist.csv.
+    """Make what is missing or changed, and write manifest.json, cutlist.csv and index.html.
 
     Raises:
         JobError: two orders of one name; FileError: OUT cannot be written, or another batch is
@@ -201,7 +205,12 @@ def _told(tasks: Sequence[Task], book: Book, store: Store, tally: Tally, mark: s
     ordered = tuple(book.records[task.name] for task in tasks)
     told = manifest(ordered)
     rows = cutlist(ordered, [task.order for task in tasks])
-    lists = {marked(CUTLIST, mark): rows, marked(MANIFEST, mark): plain_json(told)}
+    title = f"Batch {mark}" if mark else "Batch"
+    lists = {
+        marked(CUTLIST, mark): rows,
+        marked(PAGE, mark): overview(title, ordered, store.page),
+        marked(MANIFEST, mark): plain_json(told),
+    }
     try:
         store.publish(lists)
     except DevcadError as error:

@@ -20,7 +20,7 @@ FRONT, BACK = np.array([236, 179, 101]), np.array([122, 150, 176])  # the sheet'
 SHADE = 0.62  # the light that a face turned away from the sun has
 WIDTH, TALLEST, GAP, MARGIN = 720.0, 520.0, 30.0, 14.0  # px
 AZIMUTH, ELEVATION = -65.0, 24.0
-NEARER = 0.004  # of the part: what puts a ruling before the faces beside it
+NEARER = 0.03  # of the part: what puts a ruling before the faces beside it
 MOST = 6000
 """Triangles that a picture shows: of a part with more, only the patterns."""
 FRAMES, SECONDS = 16, 4.0
@@ -121,7 +121,8 @@ def _document(title: str, height: float, body: list[str]) -> str:
             f' width="{WIDTH:.0f}" height="{height:.0f}" role="img">',
             f"<title>{escape(title)}</title>",
             f'<rect width="{WIDTH:.0f}" height="{height:.0f}" rx="8" fill="#fff"/>',
-            '<g stroke-width="0.4" stroke-linejoin="round" fill="none" stroke="#44505c">',
+            # faces have strokes of their colour, or what lies behind would shine through the joints
+            '<g stroke-width="0.9" stroke-linejoin="round" fill="none" stroke="#44505c">',
             *body,
             "</g>",
             "</svg>",
@@ -148,7 +149,7 @@ def _faces(panels: list[_Seen], place: _Place) -> list[str]:
         for z, face, fill in zip(depth.tolist(), points[..., :2], fills, strict=True):
             items.append((z, f'<path d="{place(face)}Z" fill="{fill}" stroke="{fill}"/>'))
         for z, line in zip(near.tolist(), rulings[..., :2], strict=True):
-            items.append((z, f'<path d="{place(line)}"/>'))
+            items.append((z, f'<path d="{place(line)}" stroke-width=".4"/>'))
     # rounded, so that ties fall the same way on every machine
     return [text for _, text in sorted(items, key=lambda item: round(item[0], 6))]
 

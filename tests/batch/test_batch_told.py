@@ -48,6 +48,9 @@ def test_quiet_says_nothing_and_the_summary_counts(
     assert [line.split()[:-1] for line in lines[:2]] == [["done"], ["unchanged"]]
     assert [line.split()[-1] for line in lines[:3]] == ["1"] * 3
     assert lines[3].split()[:2] == ["parts", "2"]
+    page = (tmp_path / "out" / "index.html").read_text()
+    assert 'href="a/index.html"' in page and 'href="b/' not in page
+    assert page.count("</svg>") == 1 and "1 done, 1 failed" in page
 
 
 @pytest.mark.parametrize(
