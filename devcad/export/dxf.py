@@ -238,26 +238,22 @@ def _add_lines(space: Any, seen: Shown, how: Style) -> None:
     """Reference lines and those that stand for a drawing; bends with their numbers."""
     for line in seen.panel.pattern.lines:
         entity = _add_line(space, line.start, line.end, how.attributes(line.layer))
-        data = _bend_data(line, how.profile.bend_data)
-        if data:
+        if how.profile.bend_data and line.layer in BENDS:
             if APPLICATION not in space.doc.appids:
                 space.doc.appids.add(APPLICATION)
-            entity.set_xdata(APPLICATION, data)
+            entity.set_xdata(APPLICATION, _bend_data(line))
     for role, start, end in seen.lines:
         _add_line(space, start, end, how.attributes(role))
 
 
-def _bend_data(line: Line, wanted: str) -> list[tuple[int, Any]]:
+def _bend_data(line: Line) -> list[tuple[int, Any]]:
     """What a bend line tells as extended data, name before value: its angle in degrees and, where
     it has them, the inside radii in mm at its ends and its place in the order of bending."""
-    order, radius = (getattr(line, name, None) for name in ("order", "radius"))
-    if line.layer not in BENDS or wanted == "none" or (wanted == "ordered" and order is None):
-        return []
     data: list[tuple[int, Any]] = [(1000, "angle_deg"), (1040, math.degrees(line.angle))]
-    if radius is not None:
-        radii = np.broadcast_to(np.asarray(radius, dtype=float), 2).tolist()
-        data += [(1000, "radius_0"), (1040, radii[0]), (1000, "radius_1"), (1040, radii[1])]
-    return data if order is None else [*data, (1000, "order"), (1070, int(order))]
+    if line.radius is not None:
+        first, last = line.radius
+        data += [(1000, "radius_0"), (1040, first), (1000, "radius_1"), (1040, last)]
+    return data if line.order is None else [*data, (1000, "order"), (1070, line.order)]
 
 
 def _add_line(space: Any, start: Array, end: Array, attributes: dict[str, Any]) -> Any:

@@ -55,8 +55,7 @@ class Profile:
 
     ``kinds`` are the entities it may hold, ``text`` the layers that may hold words, ``chord``
     the most in mm that a polyline may keep from its curve (None: the drawing's own limit).
-    ``bend_data`` says which bend lines carry extended data: none, those that a press brake
-    numbered ("ordered"), or all.
+    ``bend_data`` says whether bend lines carry extended data.
     """
 
     name: str
@@ -67,7 +66,7 @@ class Profile:
     text: tuple[str, ...]
     blocks: bool
     bend_ticks: float
-    bend_data: Literal["none", "ordered", "all"]
+    bend_data: bool
     shortest: float
     roles: Mapping[str, Role]
     chord: float | None = None
