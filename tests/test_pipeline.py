@@ -165,7 +165,7 @@ def test_equal_jobs_give_equal_bytes(tmp_path: Path) -> None:
     assert seen[0] == seen[1]
     assert {name.rsplit(".", 1)[1] for name in seen[0]} == {
         *("step", "stl", "glb", "dxf", "svg"),
-        "json",
+        *("json", "html"),
     }
 
 

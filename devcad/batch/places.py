@@ -11,6 +11,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import re
 import shutil
 import sys
 from collections.abc import Iterator, Mapping
@@ -20,10 +21,15 @@ from typing import Any
 
 from devcad.batch.tasks import File, Record, from_plain, to_plain
 from devcad.errors import FileError
-from devcad.export.folder import PAGE, publish_file, sweep, unwritable
+from devcad.export.folder import PAGE, REPORT, publish_file, sweep, unlisted, unwritable
 
 STATE, RECORDS, FAILED_FOLDER = ".batch", ".batch/records", ".failed"
 MANIFEST, CUTLIST = "manifest.json", "cutlist.csv"
+OWN = "|".join(
+    rf"{stem}(?:-\d+-of-\d+)?\.{ending}"
+    for stem, _, ending in (name.partition(".") for name in (MANIFEST, CUTLIST, PAGE))
+)
+"""The names of a batch's lists and of its shards', as a regular expression."""
 
 
 class Folder:
@@ -178,7 +184,9 @@ def claim(path: Path, out: Path, *, shared: bool) -> int:
 
 def _clear(out: Path) -> None:
     """Remove what killed batches left of their lists."""
-    litter = [path for name in (MANIFEST, CUTLIST) for path in out.glob(f".{name}-*.part")]
+    ours = re.compile(rf"\.(?:{OWN})-[0-9a-f]{{16}}\.part")
+    litter = [path for path in out.glob(".*.part") if ours.fullmatch(path.name)]
+    litter += (out / STATE).glob("worker-*.txt")
     litter += [*(out / FAILED_FOLDER).glob(".*.part"), *(out / RECORDS).glob("*.part")]
     for path in litter:
         with suppress(OSError):
@@ -215,14 +223,22 @@ def _same(folder: Path, file: File) -> bool:
 
 
 def _set_aside(out: Path, name: str) -> None:
-    """Move an earlier order's folder to where nobody takes it for this one's."""
+    """Move an earlier order's folder to where nobody takes it for this one's; what others put
+    into it stays where they put it."""
     folder, aside = out / name, out / FAILED_FOLDER / name
-    if not folder.is_dir() or not (folder / "report.json").is_file():
+    if not folder.is_dir() or not (folder / REPORT).is_file():
         return
     with suppress(OSError):
         shutil.rmtree(aside, ignore_errors=True)
         aside.parent.mkdir(exist_ok=True)
-        folder.rename(aside)
+        strange = unlisted(folder)
+        if not strange:
+            folder.rename(aside)
+            return
+        aside.mkdir()
+        for path in sorted(folder.iterdir(), key=lambda path: path.name == REPORT):
+            if path.name not in strange:
+                path.rename(aside / path.name)
 
 
 def marked(name: str, mark: str) -> str:

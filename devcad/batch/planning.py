@@ -8,17 +8,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from devcad.batch.orders import Order, refuse
-from devcad.batch.places import CUTLIST, MANIFEST
+from devcad.batch.places import OWN
 from devcad.batch.prints import Reader, Words
 from devcad.batch.tasks import Task
 from devcad.errors import DevcadError, JobError
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
-_TAKEN = re.compile(
-    rf"(?:{'|'.join(re.escape(x.split('.')[0]) for x in (MANIFEST, CUTLIST))})"
-    r"(?:-\d+-of-\d+)?\.(?:json|csv)",
-    re.IGNORECASE,
-)
+_TAKEN = re.compile(OWN, re.IGNORECASE)
 
 
 @dataclass(frozen=True, slots=True)

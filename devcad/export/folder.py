@@ -216,7 +216,7 @@ def _strange(target: Path) -> list[str]:
         before = _identity(target)
         if before is None:
             return []
-        found = _unlisted(target)
+        found = unlisted(target)
         if not found or _identity(target) == before:
             return found
     return found
@@ -231,7 +231,7 @@ def _identity(folder: Path) -> tuple[int, int] | None:
     return status.st_dev, status.st_ino
 
 
-def _unlisted(target: Path) -> list[str]:
+def unlisted(target: Path) -> list[str]:
     """The entries of a folder that its report does not list; a bad report lists nothing."""
     with suppress(FileNotFoundError):
         entries = sorted(target.iterdir())

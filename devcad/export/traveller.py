@@ -35,6 +35,7 @@ from devcad.flatten.pattern import STITCH, Line
 from devcad.part import Panel, Part
 from devcad.shop.materials import material
 from devcad.shop.settings import PAPERS
+from devcad.shop.stock import stock_words
 
 WIDE, HIGH = PAPERS["A4"]
 EDGE = 12.0  # mm, the margin of the page
@@ -162,6 +163,7 @@ def _data(part: Part, panel: Panel) -> list[tuple[str, ...]]:
         ("blank", f"{x1 - x0:.2f} x {y1 - y0:.2f} mm"),
         ("material", _material(part.material)),
         ("thickness", f"{panel.thickness:g} mm" if panel.thickness else ""),
+        ("stock", stock_words(part.material, panel.thickness) if part.material else ""),
         ("area", _amount(facts.get("flat_area", panel.pattern.area), "mm2", 1)),
         ("mass", _amount(facts.get("mass_g"), "g", 1)),
         ("cut length", _amount(facts.get("cut_length"), "mm", 1)),

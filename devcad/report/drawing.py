@@ -121,8 +121,9 @@ def traced(edge: Edge, finest: float) -> Array:
     points = edge.curve(u.ravel())[0].reshape(len(u), COARSE + 1, 2)
     chord = points[:, -1:] - points[:, :1]
     away = points - points[:, :1]
-    length = np.maximum(np.hypot(*chord.T).T, finest)
-    rise = np.abs(chord[..., 0] * away[..., 1] - chord[..., 1] * away[..., 0]) / length
+    square = np.maximum((chord**2).sum(axis=2), 1e-30)
+    foot = ((away * chord).sum(axis=2) / square).clip(0.0, 1.0)
+    rise = np.hypot(*np.moveaxis(away - foot[..., None] * chord, 2, 0))  # a closed piece has too
     # the rise of a chord falls with the square of its length
     steps = np.sqrt(rise.max(axis=1) / finest).clip(1, MOST)
     steps = 2 ** np.ceil(np.log2(steps)).astype(int)

@@ -116,7 +116,7 @@ def overview_page(title: str, rows: Iterable[Row]) -> bytes:
 
 def picture_in(page: bytes) -> str:
     """The picture of a part out of its page, "" where the page has none: for an overview."""
-    text = page.decode("utf-8")
+    text = page.decode("utf-8", "replace")  # a disk may have spoiled it
     start, end = (text.find(mark) for mark in PICTURE)
     return text[start + len(PICTURE[0]) : end] if 0 <= start < end else ""
 

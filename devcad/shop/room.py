@@ -46,10 +46,6 @@ class Box:
         angle = np.array([self.angle])
         return np.asarray(_corners(self.centre[None], angle, self.width, self.height)[0])
 
-    def widened(self, margin: float) -> Box:
-        """The box with so much more on every side."""
-        return replace(self, width=self.width + 2.0 * margin, height=self.height + 2.0 * margin)
-
 
 @dataclass(frozen=True, slots=True)
 class Room:

@@ -28,6 +28,8 @@ FOUND, ROUGH = 1e-14, 1e-8
 is asked for, which is then known to the square of it."""
 NEAR_END = 1e-12
 """Of a loop: so far before its end its last place is taken, which else is its first."""
+CLOSED = 1e-9
+"""Of its size: an edge whose ends are no farther apart is a loop."""
 STRAIGHT = 1e-6
 """The sine by which a corner of a sheet has to be less than 180 degrees to be one."""
 BLOCK = 2_000_000
@@ -177,12 +179,25 @@ def looks(edge: Edge) -> Looks:
     return Looks(replace(series, coefficients=both), u, series(u), way)
 
 
+def _round_the_end(edge: Looks, points: Array, k: Array) -> Array:
+    """The nearest samples ``k`` (n,), and where that is the point at which a loop begins and ends,
+    the one of its two ends on whose side the foot lies."""
+    last = len(edge.u) - 1
+    size = float(np.ptp(edge.points, axis=0).max())
+    if np.hypot(*(edge.points[0] - edge.points[last])) > CLOSED * size:
+        return k
+    found, slopes = edge(edge.u[:1])
+    ends = (k == 0) | (k == last)
+    return np.where(ends, np.where((found - points) @ slopes[0] > 0.0, last, 0), k)
+
+
 def foot_on(edge: Looks, points: Array, found_by: float = FOUND) -> Array:
     """The u (n,) at which an edge is nearest to points (n, 2)."""
     u, samples = edge.u, edge.points
     rows = max(1, BLOCK // len(u))
     blocks = np.split(points, range(rows, len(points), rows))
     k = np.concatenate([((b[:, None] - samples) ** 2).sum(axis=2).argmin(axis=1) for b in blocks])
+    k = _round_the_end(edge, points, k)
     at, low, high = u[k], u[np.maximum(k - 1, 0)], u[np.minimum(k + 1, len(u) - 1)]
     reach = found_by * (u[-1] - u[0])
     for step in range(STEPS):

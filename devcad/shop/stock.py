@@ -65,7 +65,7 @@ def stock_words(name: str, thickness: float) -> str:
     if one is None:
         return ""
     if abs(one.thickness - thickness) <= AS_STOCK:
-        return f"stock: {one.words}"
+        return one.words
     return f"{thickness:.4g} mm is not kept; the nearest is {one.words}"
 
 

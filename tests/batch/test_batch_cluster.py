@@ -116,7 +116,7 @@ def test_the_command_line_on_a_cluster_gives_the_files_of_a_single_export(
     assert devcad([*batch, "--scheduler", machines.address]) == 0
     assert devcad(["export", *words, "--to", "dxf", "-o", str(tmp_path / "single")]) == 0
     ours = faulty.contents(tmp_path / "out")
-    assert ours.keys() - {"manifest.json", "cutlist.csv"} == {n for n in ours if "/" in n}
+    assert ours.keys() - {"manifest.json", "cutlist.csv", "index.html"} == {n for n in ours if "/" in n}
     assert {n: ours[n] for n in ours if "/" in n} == faulty.contents(tmp_path / "single")
 
 

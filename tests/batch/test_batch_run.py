@@ -142,9 +142,10 @@ def test_two_parts_of_one_name_are_refused_before_anything_is_done(tmp_path: Pat
     (tmp_path / "b.toml").write_text(LAMP.format(name="A", radius=3))
     with pytest.raises(JobError, match='the name "A" is taken by'):
         quick(orders, tmp_path / "out")
-    (tmp_path / "b.toml").write_text(LAMP.format(name="Manifest.json", radius=3))
-    with pytest.raises(JobError, match="the batch's own lists"):
-        quick(orders, tmp_path / "out")
+    for name in ("Manifest.json", "cutlist-1-of-3.csv", "index.html"):
+        (tmp_path / "b.toml").write_text(LAMP.format(name=name, radius=3))
+        with pytest.raises(JobError, match="the batch's own lists"):
+            quick(orders, tmp_path / "out")
     assert made(tmp_path / "out") == []
 
 
@@ -222,6 +223,35 @@ def test_a_part_that_fails_now_leaves_no_older_folder_behind(tmp_path: Path) -> 
     (tmp_path / "a.toml").write_text(LAMP.format(name="a", radius=90))
     assert quick(orders, out).code == 0
     assert not (out / ".failed").exists()
+
+
+def test_what_others_put_into_a_part_stays_where_they_put_it(tmp_path: Path) -> None:
+    orders, out = jobs(tmp_path, "a"), tmp_path / "out"
+    quick(orders, out)
+    notes = out / "a" / "notes.txt"
+    notes.write_text("mine")
+    (tmp_path / "a.toml").write_text(LAMP.format(name="a", radius=90))
+    for _ in range(2):  # refused as long as it is there
+        assert quick(orders, out).code == FileError.code
+        assert [path.name for path in (out / "a").iterdir()] == ["notes.txt"]
+    assert (out / ".failed" / "a" / "a.dxf").is_file()
+    notes.rename(tmp_path / "notes.txt")
+    assert quick(orders, out).code == 0
+    assert not (out / ".failed").exists()
+
+
+def test_what_killed_batches_left_is_removed(tmp_path: Path) -> None:
+    orders, out = jobs(tmp_path, "a"), tmp_path / "out"
+    quick(orders, out)
+    hexes = "0123456789abcdef"
+    names = (".index.html", ".manifest-1-of-3.json", ".cutlist.csv")
+    litter = [out / f"{name}-{hexes}.part" for name in names]
+    litter.append(out / ".batch" / "worker-1-0.txt")
+    for path in [*litter, out / f".mine.txt-{hexes}.part"]:
+        path.write_text("torn")
+    quick(orders, out)
+    assert not any(path.exists() for path in litter)
+    assert (out / f".mine.txt-{hexes}.part").exists()  # no name of ours
 
 
 def test_shards_share_a_folder_and_make_every_part_once(tmp_path: Path) -> None:

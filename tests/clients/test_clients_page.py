@@ -238,3 +238,36 @@ def test_without_webgl_the_same_is_drawn_as_svg(name: str, tmp_path: Path) -> No
         slide(browser, 0.5)
         assert browser.run("document.querySelector('#painted path').getAttribute('d')") != first
         assert browser.complaints() == []
+
+
+def test_all_of_the_part_is_in_view(browser: Browser, tmp_path: Path) -> None:
+    part = devcad.build(SAMPLES / "wall-bracket.toml")  # its corners reach the ball around it
+    devcad.export(part, tmp_path, formats=["svg"])
+    browser.open(tmp_path / part.name / "index.html")
+    for f in (0.0, 0.5, 1.0):
+        slide(browser, f)
+        seen = np.array(pixels(browser)).reshape(64, 64) > 0
+        assert seen.any()
+        assert not np.concatenate([seen[[0, -1]].ravel(), seen[:, [0, -1]].ravel()]).any()
+
+
+def test_rulings_show_all_around_the_part(browser: Browser, tmp_path: Path) -> None:
+    part = devcad.build(SAMPLES / "drilled-reducer.toml")
+    devcad.export(part, tmp_path, formats=["svg"])
+    browser.open(tmp_path / part.name / "index.html")
+    with_rulings = row(browser)
+    browser.run("document.getElementById('show-rulings').click()")
+    drawn = np.abs(with_rulings - row(browser)) > 8
+    inside = drawn[drawn.argmax() : drawn.size - drawn[::-1].argmax()]
+    assert all(share.any() for share in np.array_split(inside, 8))
+
+
+def row(browser: Browser) -> np.ndarray:
+    """The red of the pixels half way down the stage."""
+    found = browser.run(
+        "(() => { const c = document.getElementById('canvas'); const d = document.createElement("
+        "'canvas'); d.width = c.width; d.height = 1; const x = d.getContext('2d'); devcad.redraw();"
+        " x.drawImage(c, 0, -Math.round(0.5 * c.height)); return"
+        " Array.from(x.getImageData(0, 0, c.width, 1).data).filter((_, i) => i % 4 === 0); })()"
+    )
+    return np.array(found, dtype=int)

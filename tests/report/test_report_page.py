@@ -301,3 +301,14 @@ def test_the_drawing_is_as_large_as_the_pattern() -> None:
     np.testing.assert_allclose(numbers.min(axis=0), [xmin, -ymax], atol=0.03)
     np.testing.assert_allclose(numbers.max(axis=0), [xmax, -ymin], atol=0.03)
     assert f"{xmax - xmin:.2f} mm" in page
+
+
+def test_a_hole_is_drawn_as_large_as_it_is() -> None:
+    part = built("drilled")
+    (hole,) = part.panels[0].pattern.holes
+    assert [edge.u.size for edge in hole] == [2]  # one closed piece, whose chord is nothing
+    (data,) = re.findall(r'<path class="line CUT_INNER" d="([^"]*)"', page_of(part).decode())
+    x, y = np.array(re.findall(r"-?[\d.]+", data), dtype=float).reshape(-1, 2).T
+    area = 0.5 * abs(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)))
+    # a polygon within a fifth of a thousandth of the drawing: 0.03 mm of the radius of 7
+    assert area == pytest.approx(49.0 * np.pi, rel=0.01)

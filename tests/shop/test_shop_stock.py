@@ -59,8 +59,8 @@ def test_what_has_no_source_says_so(name: str) -> None:
 
 
 def test_a_report_names_the_sheet_or_the_nearest() -> None:
-    assert stock_words("dc01", 1.5) == "stock: 1.5 mm (trade practice; not verified)"
-    assert stock_words("dc01", 1.214).startswith("stock: 18 ga, 1.214 mm (gauge tables")
+    assert stock_words("dc01", 1.5) == "1.5 mm (trade practice; not verified)"
+    assert stock_words("dc01", 1.214).startswith("18 ga, 1.214 mm (gauge tables")
     assert "verified" not in stock_words("dc01", 1.214)
     words = stock_words("304", 1.35)
     assert re.match(r"1\.35 mm is not kept; the nearest is 1\.[25] mm", words)

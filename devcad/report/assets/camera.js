@@ -1,14 +1,13 @@
 // The camera: it looks at the middle of what there is, from the side and a little from above.
 
 const FIELD = 0.6; // radians, the camera's field of view
-const FILLS = 0.82; // how near it comes: a part seldom fills the ball around it
 
 /** A camera that turns about its target; pan is in shares of the radius, zoom a factor. */
 function newCamera() {
   return { yaw: -1.13, pitch: 0.42, zoom: 1, panX: 0, panY: 0, middle: [0, 0, 0], radius: 1 };
 }
 
-/** Looks at the box of points (x, y, z after one another). */
+/** Looks at points (x, y, z after one another): at the middle of their box, and all are in view. */
 function aim(camera, arrays) {
   const low = [Infinity, Infinity, Infinity];
   const high = [-Infinity, -Infinity, -Infinity];
@@ -19,7 +18,12 @@ function aim(camera, arrays) {
       if (points[i] > high[j]) high[j] = points[i];
     }
   camera.middle = low.map((x, j) => (x + high[j]) / 2);
-  camera.radius = Math.hypot(...low.map((x, j) => (high[j] - x) / 2)) || 1;
+  let most = 0;
+  const [x, y, z] = camera.middle;
+  for (const points of arrays)
+    for (let i = 0; i < points.length; i += 3)
+      most = Math.max(most, (points[i] - x) ** 2 + (points[i + 1] - y) ** 2 + (points[i + 2] - z) ** 2);
+  camera.radius = Math.sqrt(most) || 1;
 }
 
 /** The camera's axes (right, up, towards the viewer) when the part is unrolled by f: as the sheet
@@ -36,10 +40,10 @@ function axesOf(camera, f) {
 function matrices(camera, f, aspect) {
   const [x, y, z] = axesOf(camera, f);
   const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-  const away = FILLS * camera.radius / Math.sin(FIELD / 2) / Math.min(1, aspect) / camera.zoom;
+  const away = camera.radius / Math.sin(FIELD / 2) / Math.min(1, aspect) / camera.zoom;
   const shift = [-dot(x, camera.middle) + camera.panX * camera.radius,
     -dot(y, camera.middle) + camera.panY * camera.radius, -dot(z, camera.middle) - away];
-  const near = Math.max(away - 3 * camera.radius, away / 500);
+  const near = Math.max(away - 3 * camera.radius, away / 50);
   const far = away + 3 * camera.radius;
   const k = 1 / Math.tan(FIELD / 2);
   return {

@@ -69,7 +69,7 @@ function frame(now) {
   if (canvas.width !== pixels[0] || canvas.height !== pixels[1]) [canvas.width, canvas.height] = pixels;
   if (fresh) {
     for (const shape of shapes) shapeAt(shape, scene.f);
-    aim(camera, shapes.map((shape) => shape.middle));
+    aim(camera, shapes.map((shape) => shape.position));
     state.moved = false;
   }
   state.size = [width, height];

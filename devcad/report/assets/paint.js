@@ -42,8 +42,6 @@ function webglPainter(canvas, shapes, scene) {
   gl.enable(gl.DEPTH_TEST);
   gl.enable(gl.BLEND);
   gl.blendFuncSeparate(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA, gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
-  gl.enable(gl.POLYGON_OFFSET_FILL);
-  gl.polygonOffset(1, 8);
 
   function drawLines(data, mode, fresh) {
     feed(line, "position", data, fresh);
