@@ -15,8 +15,9 @@ from devcad.flatten.shapes import circle
 from devcad.geometry.fillets import Corner
 from devcad.geometry.taylor import Array
 
-BEYOND = 0.5
-"""Of the thickness: how far a relief reaches beyond the place where bends part."""
+BEYOND, AT_LEAST = 0.5, 0.1
+"""Of the thickness, and of the inside radius where that is more: how far a relief reaches beyond
+the place where bends part."""
 
 
 def relieved(
@@ -28,17 +29,19 @@ def relieved(
     Its centre is where the bend lines' creases meet in the pattern, the mean of what the flats
     around say. Its radius is thickness + inside radius at least, the depth that design guides ask
     of a bend relief, and so large that it takes in all places where the sheet ends beside its
-    bends, and half of the thickness more: what is left of the edge is smooth.
+    bends, and half of the thickness more (a tenth of the inside radius at least): what is left of
+    the edge is smooth.
 
     Raises:
         GeometryError: two of them run into one another.
     """
+    beyond = max(BEYOND * thickness, AT_LEAST * inside)
     made = []
     rounds: list[tuple[Array, float]] = []
     for number, corner in enumerate(corners, start=1):
         tips, ends = _images(corner, blank)
         centre = tips.mean(axis=0)
-        reach = float(np.hypot(*(ends - centre).T).max()) + BEYOND * thickness
+        reach = float(np.hypot(*(ends - centre).T).max()) + beyond
         reach = max(reach, thickness + inside)
         rounds.append((centre, reach))
         made.append(
