@@ -49,16 +49,38 @@ def test_trimesh_and_manifold3d_accept_the_winding(exported: Exported) -> None:
 
     (path,) = exported.files("stl")
     mesh = _load(path)
-    if exported.solid:
-        assert mesh.is_volume  # watertight, one winding, outward
+    if not exported.solid:
+        assert mesh.is_winding_consistent
+        return
+    bodies = _bodies(mesh)
+    assert len(bodies) == len(exported.report["panels"])
+    for each in bodies:
+        assert each.is_volume  # watertight, one winding, outward
+        assert each.volume > 0.0
         body = manifold3d.Manifold(
-            manifold3d.Mesh64(mesh.vertices, np.asarray(mesh.faces, np.uint64))
+            manifold3d.Mesh64(each.vertices, np.asarray(each.faces, np.uint64))
         )
         assert body.status() == manifold3d.Error.NoError
-        assert body.volume() == pytest.approx(mesh.volume, rel=1e-9)
-        assert mesh.volume > 0.0
-    else:
-        assert mesh.is_winding_consistent
+        assert body.volume() == pytest.approx(each.volume, rel=1e-9)
+
+
+def _bodies(mesh: trimesh.Trimesh) -> list[trimesh.Trimesh]:
+    """The closed bodies of a file, one after the other: each ends when every edge has been run
+    both ways. Where two lie wall on wall their points are one, and edges have four faces."""
+    found, begin = [], 0
+    open_edges: set[tuple[int, int]] = set()
+    for k, (a, b, c) in enumerate(mesh.faces.tolist(), start=1):
+        for edge in ((a, b), (b, c), (c, a)):
+            if edge[::-1] in open_edges:
+                open_edges.remove(edge[::-1])
+            else:
+                open_edges.add(edge)
+        if not open_edges:
+            faces = mesh.faces[begin:k]
+            found.append(trimesh.Trimesh(mesh.vertices, faces, process=False))
+            found[-1].remove_unreferenced_vertices()
+            begin = k
+    return found
 
 
 def test_triangles_have_the_surface_within_the_tolerance(exported: Exported) -> None:
