@@ -81,6 +81,25 @@ def at_most(
 FOLLOWS = {"twist": ("isometry", "fold-back", "step-twist", "volume", "area")}
 """A surface that twists is not isometric to any pattern: who allows that allows what follows."""
 
+LOWER = ("regular", "bend-radius", "flange", "hole-near-bend", "hole-size")
+"""The checks of a value that must not be less than its limit."""
+
+
+def worst(every: Iterable[Iterable[Check]]) -> list[Check]:
+    """Of each check by its name the one that is nearest to failing, in the order of the names."""
+    out: dict[str, Check] = {}
+    for check in (check for checks in every for check in checks):
+        known = out.get(check.name)
+        if known is None or _pressing(check) > _pressing(known):
+            out[check.name] = check
+    return list(out.values())
+
+
+def _pressing(check: Check) -> tuple[bool, float]:
+    """Whether a check failed, and how near it is to that: larger is worse."""
+    return not check.passed, -check.value if check.name in LOWER else check.value
+
+
 NAMES = (
     "twist",
     "crease",
@@ -89,6 +108,7 @@ NAMES = (
     "mesh-deviation",
     "fold-back",
     "overlap",
+    "score",
     "chord",
     "seam",
     "stitch",

@@ -1,4 +1,5 @@
-"""The commands for many jobs: arguments and options; what they do stands in batching.py."""
+"""The commands batch, watch and fold: arguments and options; what they do stands in batching.py
+and folding.py."""
 
 from __future__ import annotations
 
@@ -7,8 +8,8 @@ from typing import Annotated
 
 import typer
 
-from devcad import batching
-from devcad.arguments import Allow, Out, Pipeline
+from devcad import batching, folding
+from devcad.arguments import Allow, AsJson, Jobs, Out, Pipeline
 
 To = Annotated[
     str | None,
@@ -79,6 +80,20 @@ def watch(
     return batching.watch(inbox, out, asked, every=every, once=once, interrupts=context.obj)
 
 
+def fold(
+    context: typer.Context,
+    jobs: Jobs,
+    pipeline: Pipeline = None,
+    out: Out = "out",
+    allow: Allow = None,
+    as_json: AsJson = False,
+) -> int:
+    """Simulate how a sheet folds and bears loads; OUT/<job>/<job>-fold.glb, .csv and .json."""
+    return folding.fold(
+        jobs, out, pipeline=pipeline, allow=allow, as_json=as_json, interrupts=context.obj
+    )
+
+
 COMMANDS: dict[Callable[..., int], str] = {
     batch: """\b
 LIST is a CSV file: columns job, quantity, material, thickness, pipeline,
@@ -93,5 +108,12 @@ Examples:
 Examples:
   devcad watch hot -o parts --to dxf
   devcad watch hot -o parts --once""",
+    fold: """\b
+A curved fold is folded from its flat sheet; then, as any other panel, it is
+held and loaded as [simulate] in the job says: steps, supports, loads.
+\b
+Examples:
+  devcad fold samples/folded-annulus.toml
+  devcad fold lamp.toml -o simulated --json""",
 }
 """The commands, each with its examples."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -66,6 +67,49 @@ def panel_facts(
         "mass_g": None,
         "lorentz_area": None if panel.spacetime is None else lorentz_area(panel.spacetime),
         "allowed": allowed,
+    }
+
+
+def sheet_facts(
+    panel: Panel, checks: list[Check], figures: Mapping[str, float], notes: tuple[str, ...]
+) -> dict[str, Any]:
+    """The entry of a sheet folded along curved creases, from those of its flanks; and ``folds``,
+    for every crease its way, its length in mm and its fold angle along it."""
+    every = [flank.facts for flank in panel.flanks]
+    types = {facts["type"] for facts in every}
+    curves = [facts["regression"] for facts in every if facts["regression"]]
+    least = {
+        key: min((facts[key] for facts in every if facts[key] is not None), default=None)
+        for key in ("min_radius", "clearance")
+    }
+    return {
+        **every[0],
+        "name": panel.name,
+        "type": types.pop() if len(types) == 1 else "mixed",
+        "watertight": panel.mesh.watertight,
+        "apex": any(facts["apex"] for facts in every),
+        "area": sum(facts["area"] for facts in every),
+        **pattern_facts(panel.pattern),
+        **least,
+        "max_twist_deg": max(facts["max_twist_deg"] for facts in every),
+        "singularities": [point for facts in every for point in facts["singularities"]],
+        "regression": {
+            key: [value for curve in curves for value in curve[key]] for key in ("t", "points")
+        }
+        if curves
+        else None,
+        "ruling_count": sum(facts["ruling_count"] for facts in every),
+        "allowed": sorted({check.name for check in checks if not check.passed}),
+        "figures": dict(figures),
+        "notes": list(notes),
+        "folds": [
+            {
+                "way": "valley" if fold.table[0]["fold_deg"] > 0.0 else "mountain",
+                "length": fold.table[-1]["s"],
+                "table": [dict(row) for row in fold.table],
+            }
+            for fold in panel.folds
+        ],
     }
 
 

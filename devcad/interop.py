@@ -30,9 +30,9 @@ DRAWINGS = ("dxf", "svg")
 def to_build123d(part: Part, *, tolerance: float | None = None, degree: int = 5) -> Any:
     """The part as a build123d Compound named after it, a child a panel with its name and colour.
 
-    A panel is a Solid with thickness; else a Face where one face is all of it, or a Shell, its
-    front outside. Faces and edges are those of the STEP file: exact where CAD has them, splines
-    straight along the rulings elsewhere.
+    A panel is a Solid with thickness (with curved creases one for every flank); else a Face where
+    one face is all of it, or a Shell, its front outside. Faces and edges are those of the STEP
+    file: exact where CAD has them, splines straight along the rulings elsewhere.
 
     Args:
         tolerance: the largest distance of fitted faces in mm; default as for STEP.

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from devcad.checks import Check
 from devcad.flatten.blank import Blank
@@ -18,7 +19,19 @@ from devcad.mesh.mesh import Mesh
 
 if TYPE_CHECKING:  # most panels are not pressed
     from devcad.flatten.bending import BendLine
+    from devcad.geometry.linkage import Linkage
     from devcad.geometry.patch import Patch
+
+
+@dataclass(frozen=True, slots=True)
+class Fold:
+    """A curved crease of a sheet: it is the base curve (v = 0) of flank number ``child`` and the
+    ``side`` edge of flank number ``parent``. ``table`` tells the fold angle along it."""
+
+    parent: int
+    child: int
+    side: Literal["base", "top"]
+    table: tuple[Mapping[str, float], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,6 +47,11 @@ class Panel:
     ``chain`` without what is cut out, None where the pattern has the same. ``bends`` are the
     bend lines of a panel that a press brake bends, and ``facets`` the patterns of its patches,
     plane patches too, which are more than those of the blank.
+
+    A sheet folded along curved creases, ``folds``, is several chains: ``flanks`` are they, each a
+    panel with its share of the pattern and with rulings at the same parameters. Its ``blank`` is
+    the flank up to the crease, its ``chain`` what the groove of a thick sheet leaves of it. The
+    sheet itself has the mesh and the pattern of all, and the chain of the first.
     """
 
     name: str
@@ -51,6 +69,13 @@ class Panel:
     surface_area: float | None = None
     bends: tuple[BendLine, ...] = ()
     facets: tuple[Patch, ...] = ()
+    flanks: tuple[Panel, ...] = ()
+    folds: tuple[Fold, ...] = ()
+
+    @property
+    def chains(self) -> tuple[Panel, ...]:
+        """The flanks of a folded sheet, else the panel itself: one chain each."""
+        return self.flanks or (self,)
 
     def places(self, number: int, t: Array, v: Array) -> Array:
         """The places (n, 2) in the pattern of points (t, v), each (n,), of a patch of the chain.
@@ -76,6 +101,7 @@ class Part:
 
     ``material`` is the library's id of it, "" where the job names none. ``grain`` is in radians
     from +x in the pattern. ``quantity`` is how many of each panel the job asks for.
+    ``linkages`` are its mechanisms.
     """
 
     name: str
@@ -93,3 +119,4 @@ class Part:
     quantity: int = 1
     grain: float | None = None
     finish: str | None = None
+    linkages: tuple[Linkage, ...] = ()

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from devcad.assemble import PanelSpec, assemble
+from devcad.assemble import assemble
 from devcad.checks import FOLLOWS, Check, at_most, require
 from devcad.errors import DevcadError, FileError
 from devcad.export import DEFAULT_FORMATS, LAST, Options, Written, writer
 from devcad.export.folder import PAGE, REPORT, published, unwritable
 from devcad.job.load import Job, JobPanel, load
 from devcad.job.recipe import Recipe, known_checks, known_formats, resolve
+from devcad.making import PanelSpec
 from devcad.part import Panel, Part
 from devcad.proofs import mesh_volume
 from devcad.report import SvgOrigin, make_report, to_bytes
@@ -23,7 +24,10 @@ from devcad.shop.materials import Material, material
 from devcad.shop.settings import Limits
 
 if TYPE_CHECKING:
+    from devcad.features import Features
     from devcad.finishing import Edges
+    from devcad.geometry.constructions.base import BuiltPanel
+    from devcad.geometry.patch import Patch
     from devcad.shop.limits import Bounds
 
 Progress = Callable[[str], None]
@@ -48,16 +52,32 @@ def plan(
     formats: Iterable[str] = (),
     allow: Iterable[str] = (),
 ) -> Recipe:
-    """The recipe that applies to a job: the caller's words, then the job's, then the recipe's.
+    """The recipe that applies to a job: the caller's words, then the job's, then the recipe's. A
+    recipe that draws has the motion of a mechanism drawn too.
 
     Raises:
         JobError: no such recipe, format or check.
     """
     chosen, allowed = known_formats(list(formats)), known_checks(list(allow))
     try:
-        return resolve(pipeline or job.pipeline, job.recipe, formats=chosen, allow=allowed)
+        recipe = resolve(pipeline or job.pipeline, job.recipe, formats=chosen, allow=allowed)
     except DevcadError as error:
         raise error.at(place="" if pipeline else f"{job.path} > pipeline") from None
+    if chosen or "svg" not in recipe.formats or not _moves(job):
+        return recipe
+    return replace(recipe, formats=tuple(dict.fromkeys([*recipe.formats, "motion"])))
+
+
+def _moves(job: Job) -> bool:
+    """Whether the job has a mechanism whose motion is known."""
+    mechanisms = [panel.surface for panel in job.panels if hasattr(panel.surface, "linkage")]
+    if not mechanisms:
+        return False
+    from devcad.simulate.motion import motion
+
+    with suppress(DevcadError):  # what is wrong with it is told when it is built
+        return any(motion(surface.linkage()).drive is not None for surface in mechanisms)
+    return False
 
 
 def build(
@@ -96,9 +116,33 @@ def build(
             inside_radius=recipe.shop.bends.inside_radius,
             bends=recipe.shop.bends if recipe.shop.bends.mode == "press-brake" else None,
         )
-        return _finished(_named(part, job, sheet), job, recipe, edges)
+        part = _finished(_named(part, job, sheet), job, recipe, edges)
+        mechanisms = [panel for panel in job.panels if hasattr(panel.surface, "linkage")]
+        return _linked(part, job, mechanisms, made) if mechanisms else part
     except DevcadError as error:
         raise _placed(error, job) from None
+
+
+def _linked(
+    part: Part,
+    job: Job,
+    mechanisms: Sequence[JobPanel],
+    made: Sequence[tuple[JobPanel, PanelSpec]],
+) -> Part:
+    """The part with its mechanisms, each knowing its panels."""
+    from devcad.mechanisms import linked, standing
+
+    linkages = [
+        standing(
+            getattr(panel.surface, "linkage")().scaled(job.mm_per_unit),  # noqa: B009
+            [spec.name for own, spec in made if own is panel],
+            panel.place,
+            job.thickness,
+            job.reference,
+        )
+        for panel in mechanisms
+    ]
+    return linked(part, linkages)
 
 
 def _named(part: Part, job: Job, sheet: Material | None) -> Part:
@@ -269,7 +313,7 @@ def _specs(panel: JobPanel, job: Job) -> list[PanelSpec]:
         PanelSpec(
             name=f"{stem}{k}" if several else panel.name,
             kind=panel.kind,
-            patches=made.patches,
+            patches=_layered(made, job.thickness / job.mm_per_unit),
             base_closed=made.base_closed,
             drawings=made.drawings,
             figures={
@@ -282,10 +326,33 @@ def _specs(panel: JobPanel, job: Job) -> list[PanelSpec]:
             cut=getattr(panel.surface, "cut", None),
             gap=getattr(panel.surface, "gap", 0.0) * job.mm_per_unit,
             place=panel.place,
-            features=panel.features,
+            features=_features(panel, made, job.mm_per_unit),
+            flanks=made.flanks,
+            groove=_groove(panel, job),
         )
         for k, made in enumerate(built.panels, start=1)
     ]
+
+
+def _layered(made: BuiltPanel, thickness: float) -> tuple[Patch, ...]:
+    """The patches where the panel's layer of the sheet lies."""
+    away = -made.layer * thickness
+    return tuple(patch.parallel(away) for patch in made.patches) if away else made.patches
+
+
+def _features(panel: JobPanel, made: BuiltPanel, mm_per_unit: float) -> Features:
+    """The features of a panel, with the holes that its construction gives it."""
+    if not made.holes:
+        return panel.features
+    from devcad.mechanisms import with_holes
+
+    return with_holes(panel.features, made.holes, mm_per_unit)
+
+
+def _groove(panel: JobPanel, job: Job) -> float | None:
+    """The width of the grooves along a sheet's curved creases, mm, None where none is given."""
+    width = getattr(panel.surface, "groove", None)
+    return None if width is None else float(width) * job.mm_per_unit
 
 
 def _weighed(panel: Panel, sheet: Material | None) -> Panel:

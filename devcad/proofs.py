@@ -202,7 +202,9 @@ def overlap(panel: Panel) -> Check:
 
 def sheet_volume(panel: Panel) -> float:
     """The exact volume of a panel in mm3: net area x thickness and what an apex adds."""
-    return panel.area * panel.thickness + _tips(panel.chain, panel.thickness)
+    return sum(
+        flank.area * panel.thickness + _tips(flank.chain, panel.thickness) for flank in panel.chains
+    )
 
 
 def volume_error(mesh: Mesh, chain: Chain, area: float, thickness: float) -> float:
@@ -231,7 +233,7 @@ def _tip_density(frame: Frame) -> Array:
 def mesh_volume(panel: Panel, tolerance: float) -> Check:
     """The check ``volume`` of a solid's mesh: the exact volume, within area x tolerance."""
     area = panel.area
-    value = area * volume_error(panel.mesh, panel.chain, area, panel.thickness)
+    value = abs(volume(panel.mesh) - sheet_volume(panel))
     return at_most(
         "volume",
         panel.name,

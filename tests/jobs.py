@@ -26,12 +26,27 @@ JOBS = {
     "at_surface = [0.5, 0.5]\n",
 }
 
+CREASED = {
+    "annulus": 'kind = "curved-fold"\nfold = 60\nextent = [-20, 20]\n'
+    'flat_crease = { kind = "circle", radius = 100, sweep = 120 }',
+    "packet": 'kind = "curved-fold"\nfold = "-2*asin(sin(35*pi/180)/cos(t))*180/pi"\n'
+    'ruling = "90 - t*180/pi"\nright_creases = ["300*(cos(t) - cos(40*pi/180))"]\n'
+    'extent = [-10, 12]\n[surface.flat_crease]\nkind = "expression"\n'
+    'x = "-150*(cos(t) - cos(40*pi/180))"\ny = "150*sin(t)"\nz = 0\n'
+    't = ["-25*pi/180", "25*pi/180"]',
+    "stuck": 'kind = "curved-fold"\nfold = "60 + 15*sin(2*t)"\nright_creases = [15]\n'
+    'extent = [-15, 15]\nflat_crease = { kind = "circle", radius = 100, sweep = 60 }',
+}
+"""Sheets with curved creases: one cone beside another, two flaps beside a cylinder, and two
+creases that have no motion with fixed rulings."""
+
 
 @cache
-def built(name: str, thickness: float = 0.0, tolerance: float = 0.05) -> Part:
-    """The part of a job; built once a session, as it cannot change."""
-    head = f'name = "{name}"\nthickness = {thickness}\ntolerance = {tolerance}\n'
-    text = f"{head}[surface]\n{JOBS[name]}"
+def built(name: str, thickness: float = 0.0, tolerance: float = 0.05, head: str = "") -> Part:
+    """The part of a job, with more lines at its ``head``; built once a session, as it cannot
+    change."""
+    head += f'name = "{name}"\nthickness = {thickness}\ntolerance = {tolerance}\n'
+    text = f"{head}[surface]\n{(JOBS | CREASED)[name]}"
     handle, path = tempfile.mkstemp(suffix=".toml")
     os.close(handle)
     try:

@@ -207,6 +207,27 @@ ORACLES = [
         {"type": "cylinder", "min_radius": 3.0, "area": 12.0},
     ),
     Oracle(
+        "O34 a folded circular crease: two cones with their apices 50 above and below",
+        "curved-fold",
+        'flat_crease = { kind = "circle", radius = 100, sweep = 180 }\n'
+        "fold = 60\nextent = [-20, 20]",
+        {
+            "type": "cone",
+            "area": float(np.pi / 2 * (120**2 - 80**2)),
+            "min_radius": float(80 / np.tan(np.pi / 6)),  # at the inner edge
+            "flat_bbox": [-220.0, 0.0, 20.0, 120.0],
+        },
+    ),
+    Oracle(
+        "curved-fold: a parabola's strip across a cylinder, reflected in the crease's plane",
+        "curved-fold",
+        'flat_crease = { kind = "expression", x = "t**2/100", y = "t", z = 0, t = [-20, 20] }\n'
+        # rulings along x: sin(alpha) sin(beta) is constant, sin(beta) = 1/sqrt(1 + (t/50)^2)
+        'fold = "2*asin(0.5*sqrt(1 + (t/50)**2))*180/pi"\nruling = "90 - atan(t/50)*180/pi"\n'
+        "extent = [-10, 30]",
+        {"type": "cylinder", "area": 40.0 * 40.0},
+    ),
+    Oracle(
         "darboux: a helix (tau/k = 4/3): a cone, its apex scale times the modified Darboux vector",
         "darboux",
         f"{HELIX_34.format(2)}\nscale = 2\nextent = [4, 6]",
@@ -314,6 +335,19 @@ ORACLES = [
             "area": float(16 * np.tan(np.pi / 12)),
             "min_radius": 2.0,
             "cut_length": 2 * 6.394488913696617,
+        },
+    ),
+    Oracle(
+        "O27 four links of a cylinder, kept one sheet by living hinges",
+        "cylindrical-mechanism",
+        'radius = 10\njoints = [0, 50, 170, 290]\nwidths = 8\nhinge = "living"\nclearance = 0.1',
+        # the circle's length without the slit in the middle of the ground
+        {
+            "type": "cylinder",
+            "closed": False,
+            "area": float(8 * (20 * np.pi - 0.1)),
+            "min_radius": 10.0,
+            "flat_bbox": [0, 0, 8, float(20 * np.pi - 0.1)],
         },
     ),
     Oracle(
@@ -575,6 +609,11 @@ REFUSED = {
     "O17 tangent planes that are the osculating planes": (
         f'kind = "oriented"\n{HELIX_34.format(2)}\nangle = 0\nextent = [-1, 1]',
         "its own regression curve",
+    ),
+    "two curved creases whose rulings meet between them": (
+        'kind = "curved-fold"\nflat_crease = { kind = "circle", radius = 100, sweep = 90 }\n'
+        "fold = 60\nleft_creases = [-30, -71]\nextent = [-5, 5]",
+        "70 from the crease, before left_creases[1] at 71",
     ),
     "the focal surface of a circle": (
         'kind = "focal"\ncurve = { kind = "circle", radius = 2 }\nextent = [-1, 1]',

@@ -5,12 +5,13 @@ import pytest
 from patches import frustum
 
 import devcad
-from devcad.assemble import PanelSpec, assemble
+from devcad.assemble import assemble
 from devcad.errors import GeometryError, LimitError
 from devcad.flatten.green import perimeter
 from devcad.geometry import taylor
 from devcad.geometry.drawing import Drawing
 from devcad.geometry.patch import Patch, RulingJet
+from devcad.making import PanelSpec
 from devcad.mesh.build import volume
 
 

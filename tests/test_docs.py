@@ -66,6 +66,7 @@ def test_the_readme_lists_every_format() -> None:
         "cutlist": "lampshade-cutlist.csv",
         "bends": "lampshade-bends.csv",
         "rolling": "lampshade-rolling.csv",
+        "motion": "tube-fourbar-motion.svg",
     }
     formats = {name for name in FORMATS if name not in other}
     named = {f"lampshade.{name}" for name in formats} | set(other.values())

@@ -357,7 +357,10 @@ def test_two_processes_never_mix_their_files(tmp_path: Path) -> None:
 
 posix = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such signals and locks")
 WAITING = """\
-import sys, time; from devcad import pipeline, cli
+import signal, sys, time
+signal.signal(signal.SIGINT, signal.default_int_handler)  # whoever runs the tests may ignore it
+signal.signal(signal.SIGHUP, signal.SIG_DFL)
+from devcad import pipeline, cli
 def slow(name):
     print('writing', flush=True)
     try:

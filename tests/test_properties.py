@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from patches import ellipse_cylinder, frustum, helix_tangent, slanted_pipe
 from strategies import natural_equations, rigid_motions, scales
 
-from devcad.assemble import PanelSpec, assemble
+from devcad.assemble import assemble
 from devcad.flatten.development import develop, develop_chain
 from devcad.flatten.outline import lay_out, surface_area
 from devcad.geometry import taylor
@@ -16,6 +16,7 @@ from devcad.geometry.constructions.tangent import Tangent
 from devcad.geometry.curves import NaturalCurve
 from devcad.geometry.patch import Patch, RulingJet
 from devcad.geometry.rulings import place
+from devcad.making import PanelSpec
 
 PARTS = {
     "frustum": frustum(sweep=5.0),

@@ -23,8 +23,10 @@ class Options:
 
     ``step_tolerance`` None means min(tolerance / 10, 1e-4 mm). ``dxf_version``, ``dxf_curves``
     and ``dxf_bend_ticks`` (mm at both ends of a bend line, 0 for the whole line) None mean
-    what the profile has. With ``glb_animate`` glTF files unroll and fold. ``kerf`` (mm) moves
-    the contours of cut patterns before they are written, never the pattern of the part.
+    what the profile has. With ``dxf_together`` there is a drawing of all panels too; with
+    ``glb_animate`` glTF files unroll and fold, mechanisms move; where it is None those do that have
+    a motion of their own: curved creases and mechanisms. ``kerf`` (mm) moves the contours
+    of cut patterns before they are written, never the pattern of the part.
     """
 
     step_tolerance: float | None = None
@@ -34,8 +36,9 @@ class Options:
     dxf_profile: str = "generic"
     dxf_curves: str | None = None
     dxf_bend_ticks: float | None = None
+    dxf_together: bool = False
     pdf: Pdf = field(default_factory=Pdf)
-    glb_animate: bool = False
+    glb_animate: bool | None = None
     kerf: float = 0.0
 
 
@@ -67,6 +70,7 @@ FORMATS: dict[str, tuple[str, str]] = {
     "cutlist": ("devcad.export.cutlist", "CSV, a row a panel: blank, material, quantity, lengths"),
     "rolling": ("devcad.export.rolling", "CSV, the rolls' settings along a panel that is rolled"),
     "bends": ("devcad.export.bends", "CSV, a row a bend line: place, angle, radii, order"),
+    "motion": ("devcad.export.motion", "SVG figure and CSV table of how a mechanism moves"),
     "lorentz-svg": (
         "devcad.export.lorentz",
         "Lorentzian unrolling of a Minkowski surface, a figure that is not for cutting",

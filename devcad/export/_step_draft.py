@@ -38,11 +38,24 @@ class Draft:
 
     ``shares`` has for places of cuts on long edges where these are cut: the parameter on every
     layer. ``touches`` has for a station the vertices, layer by layer, where cuts touch its ruling.
-    ``moved`` is how far cuts were moved to stay off rulings, mm.
+    ``moved`` is how far cuts were moved to stay off rulings, mm. ``homes`` has for the long edges
+    of strips beyond a crease, (first station, side), those of the strips before it that they are.
     """
 
-    def __init__(self, parts: list[Strip], corners: Array, size: float, folds: Folds) -> None:
+    def __init__(
+        self,
+        parts: list[Strip],
+        corners: Array,
+        size: float,
+        folds: Folds,
+        joins: Folds | None = None,
+    ) -> None:
         self.size = size
+        joins = joins or {}
+        self.homes = {
+            (parts[k].first, side): (parts[i].first, other)
+            for (k, side), (i, other) in joins.items()
+        }
         self.folds = {
             (parts[k].first, side): (parts[i].first, other)
             for (k, side), (i, other) in folds.items()
@@ -56,9 +69,11 @@ class Draft:
         self.shares: dict[Key, tuple[float, ...]] = {}
         self.touches: dict[int, list[tuple[int, ...]]] = {}
         self.moved = 0.0
-        self._corner_of = self._number_corners(parts, folds)
+        self._corner_of = self._number_corners(parts, folds, joins)
 
-    def _number_corners(self, parts: list[Strip], folds: Folds) -> dict[tuple[int, int, int], int]:
+    def _number_corners(
+        self, parts: list[Strip], folds: Folds, joins: Folds
+    ) -> dict[tuple[int, int, int], int]:
         """One vertex for each corner; corners that a collapsed edge draws together share one, and
         so do those of long edges that lie on one another."""
         keys = list(np.ndindex(self.corners.shape[:3]))
@@ -77,6 +92,9 @@ class Draft:
         for (k, side), (i, other) in folds.items():
             for here, there in ((parts[k].first, parts[i].last), (parts[k].last, parts[i].first)):
                 root[find((here, side, 0))] = find((there, other, 0))
+        for (k, side), (i, other) in joins.items():
+            for here, there in ((parts[k].first, parts[i].first), (parts[k].last, parts[i].last)):
+                root[find((here, side, 0))] = find((there, other, 0))
         for i, _, k in keys:
             if np.abs(self.corners[i, 0, k] - self.corners[i, 1, k]).max() <= FLOOR * self.size:
                 root[find((i, 1, k))] = find((i, 0, k))
@@ -86,6 +104,16 @@ class Draft:
             if top not in numbers:
                 numbers[top] = self.add_point(self.corners[top])
         return {(i, s, k): numbers[find((i, s, k))] for i, s, k in keys}
+
+    def home(self, strip: Strip, side: int) -> tuple[int, int]:
+        """The first station and the side by which a strip's long edge is known."""
+        return self.homes.get((strip.first, side), (strip.first, side))
+
+    def forget_cuts(self) -> None:
+        """Free the names of a flank's cuts: those of the next flank are numbered anew."""
+        for name in [name for name in self.names if name[0] in ("spot", "rim")]:
+            del self.names[name]
+        self.shares.clear()
 
     def corner(self, station: int, side: int, layer: int) -> int:
         """The vertex at the end of a station's ruling."""

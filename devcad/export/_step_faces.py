@@ -122,7 +122,7 @@ def long_edge(draft: Draft, skin: Skin, side: int, part: Part, layer: int) -> in
     strip, pieces = skin.strip, skin.sides[side]
     piece = pieces[part.index]
     for k, corner in ((part.index, piece.corners[0]), (part.index + 1, piece.corners[1])):
-        name = ("kink", strip.first, side, k, layer)
+        name = ("kink", *draft.home(strip, side), k, layer)
         if 0 < k < len(pieces) and name not in draft.names:
             draft.names[name] = draft.add_point(corner[layer])
     start, end = _part_ends(draft, skin, side, part, layer)
@@ -130,7 +130,7 @@ def long_edge(draft: Draft, skin: Skin, side: int, part: Part, layer: int) -> in
     if isinstance(curve, Line):
         return draft.line(start, end)
     inside = np.ones(len(piece.probes[0]), dtype=bool)
-    name = ("long", strip.first, side, part.index, layer)
+    name = ("long", *draft.home(strip, side), part.index, layer)
     if part.low is not None or part.high is not None:
         ends = np.array([draft.points[start], draft.points[end]])
         reach = _reach(draft, skin, side, part, layer)
@@ -154,7 +154,7 @@ def _part_ends(draft: Draft, skin: Skin, side: int, part: Part, layer: int) -> t
         elif part.index == outermost:
             ends.append(draft.corner(station, side, layer))
         else:
-            ends.append(draft.names["kink", strip.first, side, part.index + k, layer])
+            ends.append(draft.names["kink", *draft.home(strip, side), part.index + k, layer])
     return ends[0], ends[1]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -29,7 +30,7 @@ from OCP.TopExp import TopExp, TopExp_Explorer
 from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape
 
 from devcad.errors import CheckFailed
-from devcad.export._step_body import Body, Cone, Cylinder, Face, Plane, Ruled
+from devcad.export._step_body import Body, Cone, Cylinder, Face, Plane, Point, Ruled
 from devcad.geometry.fit import FLOOR, Spline, ruled_twist
 from devcad.geometry.taylor import Array
 
@@ -62,9 +63,9 @@ def prove(bodies: list[Body], shape: TopoDS_Shape, size: float) -> list[Proof]:
     """The proofs of the bodies in a shape that was read back, in their order.
 
     Raises:
-        CheckFailed: not one solid or shell a panel, a shape that is not valid, other faces than
-            were written, a solid that is open, tolerances above 1e-6 mm (1e-9 of the size), or
-            edges as far off their faces.
+        CheckFailed: not one solid or shell a panel, a shape that is not valid, other faces or
+            free edges than were written (a solid has none), tolerances above 1e-6 mm (1e-9 of the
+            size), or edges as far off their faces.
     """
     kind = TopAbs_SOLID if bodies[0].solid else TopAbs_SHELL
     found = list(_shapes(shape, kind))
@@ -81,8 +82,9 @@ def _prove(body: Body, shape: TopoDS_Shape, size: float) -> Proof:
     kinds = [BRepAdaptor_Surface(f).GetType() for f in faces]
     if kinds != [_KINDS[type(f.surface)] for f in body.faces]:
         raise _wrong("other faces read back than were written", body.name)
-    if body.solid and (free := _free_edges(shape)):
-        raise _wrong(f"the solid has {free} free edges", body.name)
+    free, planned = _free_edges(shape), _planned_free(body)
+    if free != planned:
+        raise _wrong(f"{free} free edges read back, {planned} written", body.name)
     loose = ShapeAnalysis_ShapeTolerance().Tolerance(shape, 1)
     if loose > max(LOOSEST, FLOOR * size):
         raise _wrong(f"edges and vertices hold only to {loose:.3g} mm", body.name)
@@ -241,6 +243,13 @@ def _free_edges(shape: TopoDS_Shape) -> int:
         and not BRep_Tool.Degenerated_s(TopoDS.Edge(found.FindKey(k)))
         for k in range(1, found.Extent() + 1)
     )
+
+
+def _planned_free(body: Body) -> int:
+    """The number of edges that one face alone runs along, as they were written: none of a solid."""
+    uses = Counter(u.edge for face in body.faces for loop in (face.loop, *face.holes) for u in loop)
+    drawn = [k for k in uses if not isinstance(body.edges[k].curve, Point)]
+    return sum(uses[k] == 1 for k in drawn)
 
 
 def _volume(shape: TopoDS_Shape) -> float:

@@ -66,14 +66,14 @@ def fitted_rails(
         if found is not None:  # its parameter is not the patch's: each point at its own place
             return found.spline, found.s, strip.rails(found.t)
     if spline is None:
-        held = Ends(ends, _end_slopes(strip))
+        held = Ends(ends, end_slopes(strip))
         demand = _demand(strip, tolerance, degree)
         spline = fit(rails, strip.course, held, demand, start).spline
-    probe = _probe_places(spline)
+    probe = probe_places(spline)
     return spline, probe, strip.rails(strip.course(probe))
 
 
-def _end_slopes(strip: Strip) -> tuple[Array, Array] | None:
+def end_slopes(strip: Strip) -> tuple[Array, Array] | None:
     """d/ds of all edges at both ends, where they are finite."""
     t, s = strip.course.t, strip.course.s
     speeds = np.diff(t)[[0, -1]] / np.diff(s)[[0, -1]]
@@ -90,10 +90,10 @@ def _demand(strip: Strip, tolerance: float, degree: int) -> Demand:
     layers = len(strip.layers)
     blocks = tuple(slice(3 * k, 3 * k + 3) for k in range(2 * layers))
     faces = tuple((blocks[k], blocks[layers + k]) for k in range(layers))
-    return Demand(degree, tolerance, blocks, faces, *_thickness(strip, blocks), _twist_limit(strip))
+    return Demand(degree, tolerance, blocks, faces, *_thickness(strip, blocks), twist_limit(strip))
 
 
-def _twist_limit(strip: Strip) -> float:
+def twist_limit(strip: Strip) -> float:
     """0.01 degree, more only where the surface itself twists and that was allowed."""
     t = strip.course.t
     t = np.unique(np.concatenate([np.linspace(a, b, 19)[1:-1] for a, b in pairwise(t)]))
@@ -269,7 +269,7 @@ class LongEdge:
         if len(self.strip.layers) == 1 and (found := self._ellipse(t)) is not None:
             return found
         corners = self._ends(t)
-        scale = self._angle_scale()
+        scale = self.angle_scale()
         rows = self._rows(t, corners, scale)
         layers = len(self.strip.layers)
         width = 3 if self.skins is None else 5
@@ -287,7 +287,7 @@ class LongEdge:
         for b in places:
             trace = spline.part(b)
             traces.append(replace(trace, poles=trace.poles / [scale, 1.0]))
-        probe = _probe_places(spline)
+        probe = probe_places(spline)
         x = course(probe)
         span = (float(course.s[0]), float(course.s[-1]))
         return Piece(
@@ -335,7 +335,7 @@ class LongEdge:
             columns += [points[:, k], u[:, None], v[:, None]]
         return np.concatenate(columns, axis=1)
 
-    def _angle_scale(self) -> float:
+    def angle_scale(self) -> float:
         return 1.0 if self.skins is None else max(skin.radius for skin in self.skins)
 
     def _no_probes(self) -> tuple[Array, Array]:
@@ -377,7 +377,7 @@ def sweep(arc: Arc, points: Array) -> tuple[float, float]:
     return 0.0, float(u[-1] - u[0])
 
 
-def _probe_places(spline: Spline) -> Array:
+def probe_places(spline: Spline) -> Array:
     knots = np.unique(spline.knots)
     return np.asarray((knots[:-1, None] + np.diff(knots)[:, None] * PER_SPAN).ravel())
 

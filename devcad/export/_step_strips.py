@@ -141,7 +141,7 @@ def strips(panel: Panel) -> tuple[list[Strip], int]:
 def panel_size(panel: Panel) -> float:
     """The diagonal of the box around samples of the panel's edges, mm."""
     points = []
-    for patch in panel.chain.patches:
+    for patch in (patch for each in panel.chains for patch in each.chain.patches):
         t = np.linspace(*patch.domain, 33)
         jet = patch.jet(t, 0)
         points += [jet.rail(v)[0] for v in (jet.v_from, jet.v_to)]

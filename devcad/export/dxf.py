@@ -56,7 +56,7 @@ APPLICATION = "DEVCAD"
 
 def write(part: Part, folder: Path, options: Options) -> list[Written]:
     """One DXF for each panel, written, read back by a fresh parse, measured against the pattern's
-    true curves and held against its profile.
+    true curves and held against its profile; where asked for another one of all panels.
 
     Raises:
         JobError: unknown version, profile or curves, or such as the profile or R12 cannot have.
@@ -64,7 +64,12 @@ def write(part: Part, folder: Path, options: Options) -> list[Written]:
         FileError: the file cannot be written.
     """
     how = style(options)
-    return [_write_panel(part, panel, folder, how) for panel in part.panels]
+    written = [_write_panel(part, panel, folder, how) for panel in part.panels]
+    if options.dxf_together and len(part.panels) > 1:
+        from devcad.export.dxftogether import write_together
+
+        written.append(write_together(part, folder, options))
+    return written
 
 
 def _write_panel(part: Part, panel: Panel, folder: Path, how: Style) -> Written:

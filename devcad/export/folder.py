@@ -95,8 +95,7 @@ def _move_in(staging: Path, out: Path, listing: str) -> None:
     new = sorted(
         (path.name for path in staging.iterdir()), key=lambda name: (name == listing, name)
     )
-    listed = _listed(out / listing, listing)
-    old = [listing, *sorted(listed - {listing})]
+    old = [listing, *sorted(listed(out / listing, listing) - {listing})]
     old = [name for name in old if Path(name).name == name and (out / name).is_file()]
     for name in new:
         if name not in old and os.path.lexists(out / name):
@@ -235,13 +234,14 @@ def unlisted(target: Path) -> list[str]:
     """The entries of a folder that its report does not list; a bad report lists nothing."""
     with suppress(FileNotFoundError):
         entries = sorted(target.iterdir())
-        listed = _listed(target / REPORT, REPORT)
-        listed |= LITTER | ({PAGE} if listed else set())  # the page stands beside a good report
-        return [path.name for path in entries if path.name not in listed or path.is_dir()]
+        ours = listed(target / REPORT, REPORT)
+        ours |= LITTER | ({PAGE} if ours else set())  # the page stands beside a good report
+        ours |= listed(target / (fold := f"{target.name}-fold.json"), fold)  # of a simulation
+        return [path.name for path in entries if path.name not in ours or path.is_dir()]
     return []
 
 
-def _listed(report: Path, own: str) -> set[str]:
+def listed(report: Path, own: str) -> set[str]:
     """The names of the files that a report speaks of, its ``own`` included."""
     try:
         files = json.loads(report.read_bytes())["files"]

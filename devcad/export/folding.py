@@ -11,8 +11,8 @@ SIDE_BY_SIDE = 10.0
 
 
 def strip_of(panel: Panel) -> Hinged | None:
-    """The panel as a hinged strip; None where it is known by its pattern alone."""
-    if panel.blank is None or not panel.chain.patches:
+    """The panel as a hinged strip; None where it is known by its pattern alone, or is several."""
+    if panel.blank is None or not panel.chain.patches or panel.flanks:
         return None
     return hinged(panel.chain, panel.rulings, panel.places)
 

@@ -40,7 +40,9 @@ from devcad.part import Panel, Part
 from devcad.units import METRES_PER_MM
 
 if TYPE_CHECKING:
+    from devcad.export.glbcrease import Rig
     from devcad.export.glbmotion import Skeleton
+    from devcad.export.glbrigid import Swing
 
 Floats = NDArray[np.float32]
 
@@ -76,12 +78,12 @@ class _Piece:
 def write(part: Part, folder: Path, options: Options) -> list[Written]:
     """One file ``<part>.glb`` in the folder, read back.
 
-    With ``options.glb_animate`` the part folds (glbmotion.py). ``max_deviation`` is the mesh's own
-    certified deviation plus the measured rounding to float32, the largest over the panels, and
-    what the joints add. ``checks`` holds that rounding for each panel as ``glb-readback``, behind
-    them that of the motion; normals, texture places, indices and bounds that were read are
-    compared too. Triangles that use a vertex twice are left out. Normals are written with unit
-    length.
+    With ``options.glb_animate`` the part folds (glbmotion.py), a mechanism moves (glbrigid.py).
+    ``max_deviation`` is the mesh's own certified deviation plus the measured rounding to float32,
+    the largest over the panels, and what the joints add. ``checks`` holds that rounding for each
+    panel as ``glb-readback``, behind them that of the motion; normals, texture places, indices and
+    bounds that were read are compared too. Triangles that use a vertex twice are left out. Normals
+    are written with unit length.
 
     Raises:
         CheckFailed: ``glb-readback``, the file does not hold the mesh.
@@ -94,14 +96,22 @@ def write(part: Part, folder: Path, options: Options) -> list[Written]:
     pieces = _pieces(part)
     document = _document(part, pieces)
     motion = b""
-    bones: list[Skeleton | None] = []
+    bones: list[Skeleton | Rig | None] = []
     size = sum(sum(piece.sizes) for piece in pieces)
-    if options.glb_animate:
+    swung: list[Swing] = []
+    own = bool(part.linkages) or any(panel.folds for panel in part.panels)
+    animate = own if options.glb_animate is None else options.glb_animate
+    if animate and part.linkages:
+        from devcad.export import glbrigid  # few parts are mechanisms
+
+        swung = glbrigid.swings(part)
+        motion = glbrigid.animated(document, swung, size)
+    elif animate:
         from devcad.export.glbmotion import animated, skeletons  # few jobs ask for it
 
         bones = skeletons(part)
         motion = animated(document, bones, size)
-        size += len(motion)
+    size += len(motion)
     text = json.dumps(document, separators=(",", ":"), allow_nan=False).encode()
     text = text.ljust(_padded(len(text)))
     total = 12 + 8 + len(text) + 8 + size
@@ -121,6 +131,8 @@ def write(part: Part, folder: Path, options: Options) -> list[Written]:
             _write_piece(stream, piece)
         stream.write(motion)
     checks = _read_back(path, pieces, total, bones)
+    if swung:
+        checks += glbrigid.proven(path, part, total, swung)
     deviation = max(
         piece.panel.mesh.deviation + check.value
         for piece, check in zip(pieces, checks, strict=False)
@@ -298,10 +310,10 @@ def _bounds(vertices: Array) -> Json:
 
 
 def _read_back(
-    path: Path, pieces: list[_Piece], total: int, bones: Sequence[Skeleton | None]
+    path: Path, pieces: list[_Piece], total: int, bones: Sequence[Skeleton | Rig | None]
 ) -> tuple[Check, ...]:
     """Parse the file by its own tables and compare it with the meshes, then its motion with theirs:
-    a check for every panel, then one for every panel that moves."""
+    a check for every panel, then one or two for every panel that moves."""
     moved: list[Check] = []
     folded: list[Check] = []
     with opened(path, "rb") as stream:
@@ -320,10 +332,9 @@ def _read_back(
             moved.append(demanded(checks, path)[0])
         for number, skeleton in enumerate(bones):
             if skeleton is not None:
-                from devcad.export.glbmotion import folds
+                from devcad.export.glbplayed import folds
 
-                check = folds(stream, start, document, number, skeleton)
-                folded += demanded([check], path)
+                folded += demanded(folds(stream, start, document, number, skeleton), path)
     return (*moved, *folded)
 
 

@@ -12,22 +12,23 @@ from the viewer who looks along the ground.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import BinaryIO
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from devcad.checks import Check, at_most
-from devcad.export.binary import FLOAT32_STEP
 from devcad.export.folding import pattern_shifts, strip_of
-from devcad.export.glbread import CHECK, Json, accessor
+from devcad.export.glbread import Json
 from devcad.geometry.taylor import Array
-from devcad.mesh.hinged import Hinged, Numbers, motions, rotation, turning
+from devcad.mesh.hinged import Hinged, Numbers, motions, turning
 from devcad.mesh.lodged import carriers
 from devcad.part import Panel, Part
 from devcad.units import METRES_PER_MM
+
+if TYPE_CHECKING:  # few sheets have curved creases
+    from devcad.export.glbcrease import Rig
 
 VERTEX_TARGET = 34962
 FLOAT, SHORT = 5126, 5123
@@ -36,6 +37,10 @@ KEYS = ((0.0, 1.0), (2.0, 0.0), (3.0, 0.0), (5.0, 1.0), (6.0, 1.0))
 STEEP = 3.0
 """Radians: from there on a turn has keys in the middle, for half a turn could go either way."""
 UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])  # (x, y, z) -> (x, z, -y)
+
+
+Channel = tuple[int, str, Json]
+"""The number of a joint, what of it moves, and the sampler."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,12 +64,47 @@ class Skeleton:
     joints: tuple[Joint, ...]
     bodies: Numbers
     weights: Array
+    between: ClassVar[tuple[tuple[float, float], ...]] = ()
+    stretch: ClassVar[float] = 0.0
+
+    @property
+    def root(self) -> int:
+        """The number of the joint that has no parent."""
+        return self.strip.anchor
+
+    def nodes(self, first: int) -> list[Json]:
+        """The joints as nodes that rest as built, numbered from ``first``."""
+        names = [f"{self.panel.name} facet {k + 1}" for k in range(len(self.joints))]
+        return resting(self.joints, first, names)
+
+    def binds(self) -> Array:
+        """What brings points as built into the frames of the joints, (b, 16), column by column."""
+        built = motions(self.strip, 0.0)
+        origins = np.array([_origin(self.strip, k) for k in range(len(built))])
+        return inverse_binds(built, origins)
+
+    def carried(self, f: float) -> Array:
+        """The motions (b, 3, 4) of the bodies from the pattern at f: 0 as built, 1 flat."""
+        return motions(self.strip, f, self.shift)
+
+    def played(self, tail: Tail) -> Iterator[Channel]:
+        """The samplers of the joints: the number of a joint, its path, and the sampler."""
+        path = np.array([_path(self.strip, self.shift, f) for _, f in KEYS])
+        yield self.root, "translation", tail.sampler(tail.times(), path, "VEC3")
+        for k, joint in enumerate(self.joints):
+            yield k, "rotation", tail.turning(joint.turn)
 
 
-def skeletons(part: Part) -> list[Skeleton | None]:
-    """Of every panel its skeleton; None where it is known by its pattern alone: it stands still."""
-    out: list[Skeleton | None] = []
+def skeletons(part: Part) -> list[Skeleton | Rig | None]:
+    """Of every panel its skeleton; None where it is known by its pattern alone, or its creases let
+    no motion be: it stands still."""
+    out: list[Skeleton | Rig | None] = []
     for panel, shift in zip(part.panels, pattern_shifts(part), strict=True):
+        if panel.flanks:
+            from devcad.export.glbcrease import rig_of
+
+            out.append(rig_of(panel, shift, part.tolerance))
+            continue
         strip = strip_of(panel)
         if strip is None:
             out.append(None)
@@ -74,10 +114,10 @@ def skeletons(part: Part) -> list[Skeleton | None]:
     return out
 
 
-def animated(document: Json, bones: list[Skeleton | None], size: int) -> bytes:
+def animated(document: Json, bones: Sequence[Skeleton | Rig | None], size: int) -> bytes:
     """Add skeletons, skins and the animation to the document of a static file whose first nodes
     and meshes are the panels; the bytes that come behind the ``size`` bytes there are."""
-    tail = _Tail(document, size)
+    tail = Tail(document, size)
     nodes = document["nodes"]
     skins: list[Json] = []
     channels: list[Json] = []
@@ -85,9 +125,9 @@ def animated(document: Json, bones: list[Skeleton | None], size: int) -> bytes:
     for number, skeleton in enumerate(bones):
         if skeleton is None:
             continue
-        strip, first = skeleton.strip, len(nodes)
-        nodes += _nodes(skeleton.joints, first, skeleton.panel.name)
-        root = first + strip.anchor
+        first = len(nodes)
+        nodes += skeleton.nodes(first)
+        root = first + skeleton.root
         document["scenes"][0]["nodes"].append(root)
         attributes = document["meshes"][number]["primitives"][0]["attributes"]
         four = np.zeros((2, len(skeleton.bodies), 4))
@@ -97,19 +137,15 @@ def animated(document: Json, bones: list[Skeleton | None], size: int) -> bytes:
         nodes[number]["skin"] = len(skins)
         skins.append(
             {
-                "inverseBindMatrices": tail.add(_inverse_binds(strip), FLOAT, "MAT4"),
+                "inverseBindMatrices": tail.add(skeleton.binds(), FLOAT, "MAT4"),
                 "skeleton": root,
-                "joints": list(range(first, first + len(skeleton.joints))),
+                "joints": list(range(first, len(nodes))),
             }
         )
-        path = np.array([_path(strip, skeleton.shift, f) for _, f in KEYS])
-        samplers.append(tail.sampler(tail.times(), path, "VEC3"))
-        channels.append(_channel(samplers, root, "translation"))
-        for k, joint in enumerate(skeleton.joints):
-            steep = float(np.linalg.norm(joint.turn)) > STEEP
-            turns = np.array([_quaternion(joint.turn * (1.0 - f)) for _, f in _keys(steep)])
-            samplers.append(tail.sampler(tail.times(steep=steep), turns, "VEC4"))
-            channels.append(_channel(samplers, first + k, "rotation"))
+        for joint, path, sampler in skeleton.played(tail):
+            samplers.append(sampler)
+            target = {"node": first + joint, "path": path}
+            channels.append({"sampler": len(samplers) - 1, "target": target})
     if skins:
         document["skins"] = skins
         document["animations"] = [{"name": "fold", "channels": channels, "samplers": samplers}]
@@ -129,12 +165,12 @@ def _joints(strip: Hinged) -> tuple[Joint, ...]:
     for k in range(len(strip.angles) + 1):
         if k == strip.anchor:
             start = motions(strip, 0.0)[k] @ np.array([*strip.pivot, 0.0, 1.0])
-            out.append(Joint(None, _metres(start), UP @ turning(strip.built[:, :3])))
+            out.append(Joint(None, metres(start), UP @ turning(strip.built[:, :3])))
             continue
         parent, hinge, sign = (k - 1, k - 1, 1.0) if k > strip.anchor else (k + 1, k, -1.0)
         step = _origin(strip, k) - _origin(strip, parent)
         turn = np.append(along[hinge], 0.0) * (sign * strip.angles[hinge])
-        out.append(Joint(parent, _metres(np.append(step, 0.0)), UP @ turn))
+        out.append(Joint(parent, metres(np.append(step, 0.0)), UP @ turn))
     return tuple(out)
 
 
@@ -145,15 +181,15 @@ def _origin(strip: Hinged, k: int) -> Array:
     return np.asarray(strip.hinges[k - 1 if k > strip.anchor else k, 0])
 
 
-def _nodes(joints: Sequence[Joint], first: int, name: str) -> list[Json]:
-    """The joints as nodes that rest as built."""
+def resting(joints: Sequence[Joint], first: int, names: Sequence[str]) -> list[Json]:
+    """Joints as nodes that rest as built."""
     nodes: list[Json] = [
         {
-            "name": f"{name} facet {k + 1}",
+            "name": name,
             "translation": joint.place.tolist(),
-            "rotation": _quaternion(joint.turn),
+            "rotation": quaternion(joint.turn),
         }
-        for k, joint in enumerate(joints)
+        for joint, name in zip(joints, names, strict=True)
     ]
     for k, joint in enumerate(joints):
         if joint.parent is not None:
@@ -161,10 +197,9 @@ def _nodes(joints: Sequence[Joint], first: int, name: str) -> list[Json]:
     return nodes
 
 
-def _inverse_binds(strip: Hinged) -> Array:
-    """What brings points as built into the frames of the joints, (b, 16), column by column."""
-    built = motions(strip, 0.0)
-    origins = np.array([_origin(strip, k) for k in range(len(built))])
+def inverse_binds(built: Array, origins: Array) -> Array:
+    """What brings points as built into the frames of joints, (b, 16), column by column: ``built``
+    (b, 3, 4) carries their bodies from the plane, in which ``origins`` (b, 2) are theirs."""
     places = np.einsum("bij,bj->bi", built[:, :, :2], origins) + built[:, :, 3]
     turns = UP @ built[:, :, :3] @ UP.T
     out = np.zeros((len(built), 4, 4))
@@ -177,15 +212,15 @@ def _inverse_binds(strip: Hinged) -> Array:
 def _path(strip: Hinged, shift: tuple[float, float], f: float) -> Array:
     """Where the root is at f."""
     motion = motions(strip, f, shift)[strip.anchor]
-    return _metres(motion @ np.array([*strip.pivot, 0.0, 1.0]))
+    return metres(motion @ np.array([*strip.pivot, 0.0, 1.0]))
 
 
-def _metres(point: Array) -> Array:
+def metres(point: Array) -> Array:
     """A point or a step in mm as glTF has it; no zero is negative."""
     return UP @ point * METRES_PER_MM + 0.0
 
 
-def _quaternion(turn: Array) -> list[float]:
+def quaternion(turn: Array) -> list[float]:
     """A turn about a vector by its length as x, y, z, w."""
     angle = math.sqrt(float(turn @ turn))
     share = math.sin(0.5 * angle) / angle if angle else 0.5
@@ -195,7 +230,7 @@ def _quaternion(turn: Array) -> list[float]:
 # --- the animation -------------------------------------------------------------------------
 
 
-class _Tail:
+class Tail:
     """Accessors added to a document, and their bytes."""
 
     def __init__(self, document: Json, size: int) -> None:
@@ -238,6 +273,12 @@ class _Tail:
         """A sampler between these values."""
         return {"input": times, "interpolation": "LINEAR", "output": self.add(values, FLOAT, shape)}
 
+    def turning(self, turn: Array) -> Json:
+        """A sampler of a turn that grows evenly from nothing, flat, to ``turn`` as built."""
+        steep = float(np.linalg.norm(turn)) > STEEP
+        turns = np.array([quaternion(turn * (1.0 - f)) for _, f in _keys(steep)])
+        return self.sampler(self.times(steep=steep), turns, "VEC4")
+
 
 def _keys(steep: bool) -> list[tuple[float, float]]:
     """Seconds and states; for steep turns one more half way between two that differ."""
@@ -247,84 +288,3 @@ def _keys(steep: bool) -> list[tuple[float, float]]:
             out.append((0.5 * (before[0] + after[0]), 0.5))
         out.append(after)
     return out
-
-
-def _channel(samplers: list[Json], node: int, path: str) -> Json:
-    return {"sampler": len(samplers) - 1, "target": {"node": node, "path": path}}
-
-
-# --- what was written ----------------------------------------------------------------------
-
-
-def folds(stream: BinaryIO, start: int, document: Json, number: int, skeleton: Skeleton) -> Check:
-    """How far a panel's points are, in mm, from where they should be, flat and as built, when the
-    animation that was read moves the joints that were read."""
-    skin = document["skins"][document["nodes"][number]["skin"]]
-    attributes = document["meshes"][number]["primitives"][0]["attributes"]
-
-    def read(index: int) -> Array:
-        found = accessor(stream, start, document, index)
-        return found.rows(slice(0, found.count)).astype(float)
-
-    points = read(attributes["POSITION"])
-    bodies = read(attributes["JOINTS_0"]).astype(int)
-    weights = read(attributes["WEIGHTS_0"])
-    binds = read(skin["inverseBindMatrices"]).reshape(-1, 4, 4).swapaxes(1, 2)
-    built = motions(skeleton.strip, 0.0)
-    worst = 0.0
-    for time, f in KEYS[:2]:
-        joints = _posed(document, skin, read, time) @ binds
-        seen = np.zeros_like(points)
-        true = np.zeros_like(points)
-        exact = motions(skeleton.strip, f, skeleton.shift)
-        for column in range(2):
-            body, weight = bodies[:, column], weights[:, column, None]
-            seen += weight * _applied(joints[body], points)
-            flat = np.einsum(
-                "nji,nj->ni", built[body, :, :3], skeleton.panel.mesh.vertices - built[body, :, 3]
-            )
-            true += skeleton.weights[:, column, None] * _applied(exact[body], flat)
-        worst = max(worst, float(np.linalg.norm(seen - true @ UP.T * METRES_PER_MM, axis=1).max()))
-    size = float(np.abs(points).max()) + float(np.abs(skeleton.strip.flat).max()) * METRES_PER_MM
-    return at_most(
-        CHECK,
-        skeleton.panel.name,
-        worst / METRES_PER_MM,
-        FLOAT32_STEP * size / METRES_PER_MM * len(binds),
-        "mm",
-        says=f"the animation leaves points up to {worst / METRES_PER_MM:.3g} mm from their places",
-    )
-
-
-def _posed(document: Json, skin: Json, read: Callable[[int], Array], time: float) -> Array:
-    """The joints (b, 4, 4) at a key of the animation."""
-    nodes, (animation,) = document["nodes"], document["animations"]
-    local = {node: dict(nodes[node]) for node in skin["joints"]}
-    for channel in animation["channels"]:
-        node, path = channel["target"]["node"], channel["target"]["path"]
-        if node in local:
-            sampler = animation["samplers"][channel["sampler"]]
-            key = int(np.argmin(np.abs(read(sampler["input"])[:, 0] - time)))
-            local[node][path] = read(sampler["output"])[key].tolist()
-    out: dict[int, Array] = {}
-    left = [(skin["skeleton"], np.eye(4))]
-    while left:
-        node, parent = left.pop()
-        out[node] = parent @ _matrix(local[node]["rotation"], local[node]["translation"])
-        left += [(child, out[node]) for child in nodes[node].get("children", ())]
-    return np.array([out[node] for node in skin["joints"]])
-
-
-def _matrix(quaternion: Sequence[float], place: Sequence[float]) -> Array:
-    """A node's matrix (4, 4)."""
-    vector, w = np.array(quaternion[:3]), quaternion[3]
-    length = float(np.linalg.norm(vector))
-    out = np.eye(4)
-    out[:3, :3] = rotation(vector * (2.0 * math.atan2(length, w) / length if length else 0.0))
-    out[:3, 3] = place
-    return out
-
-
-def _applied(motion: Array, points: Array) -> Array:
-    """Points (n, 3), each moved by its own motion (n, 3 or 4, 4)."""
-    return np.asarray(np.einsum("nij,nj->ni", motion[:, :3, :3], points) + motion[:, :3, 3])

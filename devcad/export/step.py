@@ -9,6 +9,7 @@ again on the file as a fresh reader sees it.
 from __future__ import annotations
 
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -36,7 +37,9 @@ def write(part: Part, folder: Path, options: Options) -> list[Written]:
     """Write ``part``.step into the folder and prove it on what reads back.
 
     One file in mm: a solid a panel with thickness, else a sheet body whose front is +n; several
-    panels under one assembly named after the job. Equal input gives equal bytes.
+    panels under one assembly named after the job. A sheet folded along curved creases is one
+    sheet body whose faces share the creases as edges; with thickness its flanks are solids for
+    themselves, PANEL-1, PANEL-2, ... Equal input gives equal bytes.
 
     Returns:
         the file with its largest deviation in mm (0 where all faces and edges are exact) and, for
@@ -55,25 +58,40 @@ def written(part: Part, path: Path, format: str, options: Options) -> Written:
     size = max(panel_size(p) for p in part.panels)
     plans, checks = bodies(part, tolerance, options.step_degree)
     shapes = [(b.name, shape_of(b)) for b in plans]
-    many = any(p.cuts or p.bends or drawn(p.chain, p.thickness) for p in part.panels)
+    chains = [one for panel in part.panels for one in panel.chains]
+    many = any(p.cuts or p.bends or drawn(p.chain, p.thickness) for p in chains)
     write_step(path, part.name, shapes, part.colour, options.step_schema, sparing=many)
     proofs = prove(plans, read_step(path), size)
-    for panel, plan, proof in zip(part.panels, plans, proofs, strict=True):
-        checks += _checks(panel, plan, proof, tolerance)
+    proven = zip(plans, proofs, strict=True)
+    for panel in part.panels:
+        each = [_checks(one, *next(proven), tolerance) for one in _sheets(panel)]
+        worst = [max(same, key=lambda check: check.value) for same in zip(*each, strict=True)]
+        checks += [replace(check, panel=panel.name) for check in worst]
     return Written(path, format, max(p.deviation for p in proofs), tuple(checks))
 
 
 def bodies(part: Part, tolerance: float, degree: int) -> tuple[list[Body], list[Check]]:
     """The bodies of a part's panels, fitted within ``tolerance`` (mm), and for every seam the
-    check step-seam.
+    check step-seam; of a thick sheet with curved creases a body for every flank.
 
     Raises:
         GeometryError: as :func:`write`.
     """
+    part = replace(part, panels=tuple(one for panel in part.panels for one in _sheets(panel)))
     seams = coinciding(part)
     meeting = {k for seam in seams for k in seam.panels}
     planned = [_body(p, tolerance, degree, sewn=k in meeting) for k, p in enumerate(part.panels)]
     return shared(planned, seams, tolerance)
+
+
+def _sheets(panel: Panel) -> tuple[Panel, ...]:
+    """What becomes a body: the panel, or the flanks that grooves part in a thick sheet."""
+    if not (panel.folds and panel.thickness):
+        return (panel,)
+    return tuple(
+        replace(flank, name=f"{panel.name}-{number}")
+        for number, flank in enumerate(panel.flanks, start=1)
+    )
 
 
 def step_tolerance(part: Part, options: Options) -> float:

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from devcad.flatten.blank import Blank, reaches_tips
 from devcad.flatten.development import develop_chain
-from devcad.flatten.fold import Folded, fold_chain
+from devcad.flatten.fold import Bending, Folded, fold_chain
 from devcad.flatten.neutral import Fibre
 from devcad.geometry import taylor
 from devcad.geometry.chain import Chain, link
-from devcad.geometry.patch import Patch, RulingJet
+from devcad.geometry.patch import Frame, Patch, RulingJet
 from devcad.geometry.taylor import Array
 
 STILL_CLOSED = 1e-6
@@ -32,7 +33,8 @@ def bent(blank: Blank, bend: float) -> Chain:
     developments = blank.developments if blank.isometric else develop_chain(chain, rest)
     first = chain.patches[0].frame([chain.patches[0].domain[0]])
     folded = fold_chain(developments, chain, first, bend)
-    patches = tuple(_bent(*each, bend) for each in zip(chain.patches, folded, rest, strict=True))
+    much = _evenly(bend)
+    patches = tuple(_bent(*each, much) for each in zip(chain.patches, folded, rest, strict=True))
     joined = link(patches, base_closed=False, tolerance=STILL_CLOSED)
     return replace(
         chain,
@@ -48,12 +50,34 @@ def neutral(blank: Blank) -> Chain:
     first = chain.patches[0].frame([chain.patches[0].domain[0]])
     whole = fold_chain(blank.developments, chain, first, 1.0)
     every = zip(chain.patches, whole, blank.fibres, strict=True)
+    return replace(chain, patches=tuple(_bent(*each, _evenly(1.0)) for each in every))
+
+
+def unevenly_bent(blank: Blank, first: Frame, bends: Sequence[Bending]) -> Chain:
+    """The middle surface with c -> bend(t) c, each patch by its own of ``bends``, from the frame
+    ``first`` of its first ruling on: an isometry, whatever the bends are.
+
+    For smooth chains that keep their middle's length. Source: geometry.md, 14.
+    """
+    chain = blank.middle
+    folded = fold_chain(blank.developments, chain, first, bends)
+    every = zip(chain.patches, folded, bends, strict=True)
+    patches = tuple(_bent(patch, each, None, bend) for patch, each, bend in every)
+    joined = link(patches, base_closed=False, tolerance=STILL_CLOSED)
     return replace(
-        chain, patches=tuple(_bent(patch, each, fibre, 1.0) for patch, each, fibre in every)
+        chain,
+        patches=patches,
+        joints=joined.joints,
+        closing=joined.closing if chain.closed else None,
     )
 
 
-def _bent(patch: Patch, folded: Folded, rest: Fibre | None, bend: float) -> Patch:
+def _evenly(bend: float) -> Bending:
+    """One number for all rulings."""
+    return lambda t, order: taylor.constant(bend, order, len(t))
+
+
+def _bent(patch: Patch, folded: Folded, rest: Fibre | None, bend: Bending) -> Patch:
     """The patch whose frame starts from the folded one and obeys the frame's own equations; by
     ``rest`` it is shorter than the patch was."""
     tips = reaches_tips(patch) if rest else (False, False)
@@ -62,7 +86,7 @@ def _bent(patch: Patch, folded: Folded, rest: Fibre | None, bend: float) -> Patc
         c0, e, m, n = (np.zeros((order + 1, len(t), 3)) for _ in range(4))
         c0[0], e[0], m[0], n[0] = folded.frames(t)
         jet = patch.frame_jet(t, max(order - 1, 0))
-        a, c, p, q = jet.a, bend * jet.c, jet.p, jet.q
+        a, c, p, q = jet.a, taylor.mul(bend(t, max(order - 1, 0)), jet.c), jet.p, jet.q
         extent = patch.field(t, order)
         v_from, v_to = extent.v_from, extent.v_to
         if rest is not None:

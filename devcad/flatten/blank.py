@@ -66,10 +66,13 @@ class Blank:
         return self.developments[number].points(t, v)
 
 
-def lay_flat(middle: Chain, fibre: Fibre | None = None) -> Blank:
-    """The blank of a middle surface (not bent), of its neutral fibre where one is given."""
+def lay_flat(
+    middle: Chain, fibre: Fibre | None = None, start: tuple[float, Array] | None = None
+) -> Blank:
+    """The blank of a middle surface (not bent), of its neutral fibre where one is given; its first
+    ruling lies at ``start``, an angle and the place (2,) of c0, else along +x from the origin."""
     fibres = tuple(fibre if fibre and fibre.acts(patch) else None for patch in middle.patches)
-    developments = develop_chain(middle, fibres)
+    developments = develop_chain(middle, fibres, start)
     chain = middle
     if any(fibres):
         chain = flat_chain(middle, [each.series for each in developments], fibres)

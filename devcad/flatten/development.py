@@ -118,11 +118,14 @@ def develop(patch: Patch, fibre: Fibre | None = None) -> Development:
     return Development(_assemble(rates))
 
 
-def develop_chain(chain: Chain, fibres: Sequence[Fibre | None] = ()) -> tuple[Development, ...]:
+def develop_chain(
+    chain: Chain, fibres: Sequence[Fibre | None] = (), start: tuple[float, Array] | None = None
+) -> tuple[Development, ...]:
     """The developments of a chain's patches, each laid on along the ruling it shares; of their
-    neutral ``fibres``, where a patch has one."""
+    neutral ``fibres``, where a patch has one. ``start`` is the angle of the first ruling and the
+    place (2,) of c0 there, 0 and the origin where it is None."""
     out: list[Development] = []
-    omega, origin = 0.0, np.zeros(2)
+    omega, origin = start or (0.0, np.zeros(2))
     for k, patch in enumerate(chain.patches):
         if k:
             origin = origin + chain.joints[k - 1].shift * _direction(np.array([omega]))[0]

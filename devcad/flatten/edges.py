@@ -12,7 +12,7 @@ from devcad.flatten.shapes import MARK
 from devcad.flatten.trace import evaluate
 from devcad.geometry.taylor import Array
 
-STROKES = {MARK, "SEW", "GRAIN", "LABEL", "GLUE", "NOTCH_MARK"}
+STROKES = {MARK, "SCORE", "SEW", "GRAIN", "LABEL", "GLUE", "NOTCH_MARK"}
 """Roles of drawings whose edges are strokes of a pen, one after the other."""
 DROPPED = 1e-9  # of the outline's size: a shorter edge is a corner
 SMOOTH = 1e-6  # rad: a smaller corner between two edges is none

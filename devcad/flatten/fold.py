@@ -11,6 +11,7 @@ Source: geometry.md, 14; Hairer, Lubich and Wanner, Geometric Numerical Integrat
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,6 +23,8 @@ from devcad.geometry.chebyshev import Piecewise
 from devcad.geometry.patch import Frame
 from devcad.geometry.taylor import Array
 
+Bending = Callable[[Array, int], Array]
+"""t (n,) and an order K -> the series (K + 1, n) of what c is multiplied by."""
 NODES = 17
 ROUNDS = 9
 """How often panels that are not resolved are halved."""
@@ -58,10 +61,11 @@ class Folded:
         return c0, e, np.cross(n, e), n
 
 
-def fold(development: Development, start: Array, bend: float) -> Folded:
+def fold(development: Development, start: Array, bend: float | Bending) -> Folded:
     """Bend a development from the motion ``start`` (3, 4) at its first ruling.
 
-    ``bend`` scales the bending c: 0 stays flat, 1 is the part. Reads the pattern and c only.
+    ``bend`` scales the bending c, everywhere alike or from ruling to ruling: 0 stays flat, 1 is the
+    part. Reads the pattern and c only.
     """
     knots = _panels(development, bend)
     # rotations and lengths stand in one matrix: in units of the pattern's size both are about 1
@@ -85,7 +89,7 @@ def fold(development: Development, start: Array, bend: float) -> Folded:
     return Folded(development, Piecewise(knots, table))
 
 
-def _flow(development: Development, knots: Array, bend: float, unit: float) -> Array:
+def _flow(development: Development, knots: Array, bend: float | Bending, unit: float) -> Array:
     """Each panel's motion from its start to its nodes, (k, NODES, 4, 4), lengths in ``unit``."""
     low, high = knots[:-1], knots[1:]
     t = np.stack(
@@ -102,27 +106,40 @@ def _flow(development: Development, knots: Array, bend: float, unit: float) -> A
 
 
 def fold_chain(
-    developments: tuple[Development, ...], chain: Chain, first: Frame, bend: float
+    developments: tuple[Development, ...],
+    chain: Chain,
+    first: Frame,
+    bend: float | Sequence[Bending],
 ) -> tuple[Folded, ...]:
-    """Bend all patches of a chain; ``first`` is the frame at the start, which stays."""
-    motion = np.column_stack([first.e[0], first.m[0], first.n[0], first.c0[0]])
+    """Bend all patches of a chain; ``first`` is the frame at the start, which stays. ``bend`` is
+    one number for all, or a function of every patch of a chain without creases."""
+    motion = _motion(developments[0], first)
     out: list[Folded] = []
     for k, development in enumerate(developments):
-        if k:
+        if k and isinstance(bend, (int, float)):
             motion = motion @ _crease(development, bend * chain.joints[k - 1].angle)
-        folded = fold(development, motion, bend)
+        folded = fold(development, motion, bend if isinstance(bend, (int, float)) else bend[k])
         motion = folded.motion(folded.motion.knots[-1:]).reshape(3, 4)
         out.append(folded)
     return tuple(out)
 
 
-def _panels(development: Development, bend: float) -> Array:
+def _motion(development: Development, first: Frame) -> Array:
+    """The motion (3, 4) that carries the first ruling of a development to where it is in space."""
+    omega, x, y = development.series(development.series.knots[:1])[0, :3]
+    cos, sin = np.cos(omega), np.sin(omega)
+    right = cos * first.e[0] - sin * first.m[0]
+    up = sin * first.e[0] + cos * first.m[0]
+    return np.column_stack([right, up, first.n[0], first.c0[0] - x * right - y * up])
+
+
+def _panels(development: Development, bend: float | Bending) -> Array:
     """The development's panels, divided so that none bends or turns by more than TURN."""
     knots = development.series.knots
     nodes = np.linspace(0.0, 1.0, 9)
     t = knots[:-1, None] + np.diff(knots)[:, None] * nodes[1:-1]
     values = development.series(t.ravel())
-    rate = np.abs(values[:, 3]).reshape(t.shape).max(axis=1) * abs(bend)
+    rate = np.abs(values[:, 3] * _share(bend, t.ravel())).reshape(t.shape).max(axis=1)
     turn = np.abs(development.series.derivative()(t.ravel())[:, 0]).reshape(t.shape).max(axis=1)
     # a panel of d nodes resolves polynomials of degree d - 1; the pattern may be of higher degree
     degree = development.series.coefficients.shape[1] / NODES
@@ -138,11 +155,16 @@ def _panels(development: Development, bend: float) -> Array:
     )
 
 
-def _generator(development: Development, t: Array, bend: float, unit: float) -> Array:
+def _share(bend: float | Bending, t: Array) -> Array:
+    """What c is multiplied by at t (n,)."""
+    return np.full(len(t), bend) if isinstance(bend, (int, float)) else bend(t, 0)[0]
+
+
+def _generator(development: Development, t: Array, bend: float | Bending, unit: float) -> Array:
     """The rotation at rate bend * c about the ruling's line, as (n, 4, 4) matrices."""
     omega, x, y, c = development.series(t).T
     x, y = x / unit, y / unit
-    rate = bend * c
+    rate = _share(bend, t) * c
     u, w = rate * np.cos(omega), rate * np.sin(omega)
     out = np.zeros((len(t), 4, 4))
     out[:, 2, 0], out[:, 0, 2] = -w, w

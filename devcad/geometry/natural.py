@@ -13,14 +13,15 @@ integral form: Greengard, SIAM J. Numer. Anal. 28 (1991), 1071-1080.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
 from devcad.errors import JobError, LimitError
 from devcad.geometry.chebyshev import Piecewise, integration_of_values, nodes, transform
 from devcad.geometry.curve import Curve, ends_meet
-from devcad.geometry.taylor import Array
+from devcad.geometry.taylor import Array, constant
 
 Scalar = Callable[[Array, int], Array]
 """Parameters t (n,) and an order K to a Taylor series (K + 1, n)."""
@@ -43,32 +44,65 @@ def natural(
         JobError: curvature or torsion is not finite somewhere.
         LimitError: the frame turns too often to be followed.
     """
-    path = _integrate(curvature, torsion, domain, origin, frame)
 
-    def jet(t: Array, order: int) -> Array:
-        return _series(path(t), curvature(t, order), torsion(t, order), order)
+    def rates(t: Array, order: int) -> tuple[Array, Array, Array]:
+        return constant(1.0, order, t.size), curvature(t, order), torsion(t, order)
 
-    curve = Curve(jet, domain)
+    framed = framed_curve(rates, domain, origin, frame)
+    curve = Curve(lambda t, order: framed(t, order)[0], domain)
     return replace(curve, closed=ends_meet(curve))
 
 
-def _integrate(
-    curvature: Scalar, torsion: Scalar, domain: tuple[float, float], origin: Array, frame: Array
-) -> Piecewise:
+Rates = Callable[[Array, int], tuple[Array, Array, Array]]
+"""Parameters t (n,) and an order K to the series (K + 1, n) of ds/dt, k ds/dt and tau ds/dt."""
+
+
+@dataclass(frozen=True, slots=True)
+class Framed:
+    """A curve with the frame that its rates move: what ``framed_curve`` gives."""
+
+    path: Piecewise
+    rates: Rates
+
+    def __call__(self, t: Array, order: int) -> tuple[Array, Array, Array, Array]:
+        """The series of the point, T, N and B at t (n,), each (order + 1, n, 3)."""
+        return _series(self.path(t), self.rates(t, order), order)
+
+
+def framed_curve(
+    rates: Rates,
+    domain: tuple[float, float],
+    origin: Array,
+    frame: Array,
+    breaks: tuple[float, ...] = (),
+) -> Framed:
+    """The curve of any parameter whose frame moves at these rates, and that frame.
+
+    As ``natural``: T' = k N, N' = -k T + tau B, B' = -tau N and r' = T, each times the speed
+    ds/dt > 0. ``breaks`` are interior parameters where the rates may jump.
+
+    Raises:
+        JobError: a rate is not finite somewhere; LimitError: the frame turns too often.
+    """
+    return Framed(_integrate(rates, (domain[0], *breaks, domain[1]), origin, frame), rates)
+
+
+def _integrate(rates: Rates, knots: tuple[float, ...], origin: Array, frame: Array) -> Piecewise:
     """The frame and the position, a row (T, N, B, r) of 12 numbers, over the domain."""
     done: list[tuple[float, Array]] = []
-    stack = [domain]
+    domain = knots[0], knots[-1]
+    stack = list(pairwise(knots))[::-1]
     start, place = frame, origin
     while stack:
         low, high = stack.pop()
         t = nodes(low, high, NODES)
-        k, tau = curvature(t, 0)[0], torsion(t, 0)[0]
+        speed, k, tau = (rate[0] for rate in rates(t, 0))
         _check_finite(t, k, "curvature")
         _check_finite(t, tau, "torsion")
         half = 0.5 * (high - low)
         turning = half * max(np.abs(k).max(), np.abs(tau).max())
         values = _turned(half * k, half * tau) @ start if turning < NODES else None
-        coefficients = None if values is None else _resolved(values)
+        coefficients = None if values is None else _resolved(values, speed)
         if coefficients is None and high - low > FINEST * (domain[1] - domain[0]):
             middle = 0.5 * (low + high)
             stack += [(middle, high), (low, middle)]
@@ -77,12 +111,13 @@ def _integrate(
             continue
         if values is None:
             raise _too_fast(low, turning / half)
-        position = place + half * (integration_of_values(NODES) @ values[:, 0])
+        along = speed[:, None] * values[:, 0]
+        position = place + half * (integration_of_values(NODES) @ along)
         rows = np.concatenate([values.reshape(NODES, 9), position], axis=1)
         done.append((low, transform(NODES) @ rows))
         start, place = _orthonormal(values[-1]), position[-1]
-    knots = np.array([low for low, _ in done] + [domain[1]])
-    return Piecewise(knots, np.stack([table for _, table in done]))
+    lows = np.array([low for low, _ in done] + [domain[1]])
+    return Piecewise(lows, np.stack([table for _, table in done]))
 
 
 def _turned(k: Array, tau: Array) -> Array:
@@ -99,14 +134,20 @@ def _turned(k: Array, tau: Array) -> Array:
     return np.asarray(np.linalg.solve(system, np.tile(np.eye(3), (NODES, 1)))).reshape(-1, 3, 3)
 
 
-def _resolved(values: Array) -> Array | None:
-    """The Chebyshev coefficients of the frame on a panel, None if its tail has not drowned."""
-    coefficients = transform(NODES) @ values.reshape(NODES, 9)
+def _resolved(values: Array, speed: Array) -> Array | None:
+    """The Chebyshev coefficients of the frame on a panel, None if its tail has not drowned, or
+    that of the velocity."""
+    along = (speed / speed.max())[:, None] * values[:, 0]
+    coefficients = transform(NODES) @ np.concatenate([values.reshape(NODES, 9), along], axis=1)
     return coefficients if np.abs(coefficients[-3:]).max() <= DROWNED else None
 
 
-def _series(rows: Array, k: Array, tau: Array, order: int) -> Array:
-    """The Taylor coefficients of the position, from the frame equations, one order at a time."""
+def _series(
+    rows: Array, rates: tuple[Array, Array, Array], order: int
+) -> tuple[Array, Array, Array, Array]:
+    """The Taylor coefficients of the position and the frame, from the frame equations, one order
+    at a time."""
+    speed, k, tau = rates
     n = len(rows)
     frame = _orthonormal(rows[:, :9].reshape(n, 3, 3))
     t, nn, b = (np.zeros((order + 1, n, 3)) for _ in range(3))
@@ -114,11 +155,11 @@ def _series(rows: Array, k: Array, tau: Array, order: int) -> Array:
     r = np.zeros((order + 1, n, 3))
     r[0] = rows[:, 9:]
     for j in range(order):
-        r[j + 1] = t[j] / (j + 1)
+        r[j + 1] = _product(speed, t, j) / (j + 1)
         kn, kt = _product(k, nn, j), _product(k, t, j)
         tb, tn = _product(tau, b, j), _product(tau, nn, j)
         t[j + 1], nn[j + 1], b[j + 1] = kn / (j + 1), (tb - kt) / (j + 1), -tn / (j + 1)
-    return r
+    return r, t, nn, b
 
 
 def _product(x: Array, y: Array, j: int) -> Array:

@@ -7,7 +7,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from pydantic import BaseModel, ValidationError
@@ -26,6 +26,9 @@ from devcad.job.recipe import RecipeTable
 from devcad.job.tables import EdgesTable, JobTable, MetaTable, PanelTable, PlaceTable
 from devcad.shop.settings import ALLOWANCES, EDGES, EdgeFinish, EdgeName
 from devcad.units import MM_PER_UNIT
+
+if TYPE_CHECKING:  # few jobs are simulated
+    from devcad.simulate.settings import Simulation
 
 MAX_JOB_BYTES = 256_000
 MAX_POINTS_BYTES = 4_000_000  # 100 000 points with 12 digits each
@@ -89,6 +92,7 @@ class Job:
     single: bool
     panels: tuple[JobPanel, ...]
     seams: tuple[Seam, ...] = ()
+    simulate: Simulation | None = None
 
 
 def load(
@@ -203,6 +207,12 @@ def job_of(tree: dict[str, Any], place: str, sha256: str) -> Job:
         surface, wrong = _surface(inner, where, scale)
         found += wrong
         surfaces += [(inner["kind"], surface)] if surface is not None else []
+    simulate = None
+    if isinstance(tree.get("simulate"), dict):
+        from devcad.job.simulation import read_simulation
+
+        simulate, wrong = read_simulation(tree["simulate"], place, scale)
+        found += wrong
     raise_all(sorted(found, key=lambda error: -error.code))  # a limit tells more than a typo
     assert table is not None  # raise_all spoke otherwise
     names = [panel.name for panel in table.panel or ()] or [table.name]
@@ -230,6 +240,7 @@ def job_of(tree: dict[str, Any], place: str, sha256: str) -> Job:
             )
         ),
         seams=seams,
+        simulate=simulate,
     )
 
 

@@ -79,6 +79,7 @@ class DxfTable(Table):
     bend_ticks: Annotated[float, Field(ge=0.0)] | None = Field(
         None, description="mm at both ends of a bend line instead of the whole line; 0: whole"
     )
+    together: bool | None = Field(None, description="whether one more has all panels of a part")
 
 
 class RecipeTable(Table):

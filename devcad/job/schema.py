@@ -8,6 +8,7 @@ from pydantic import Field, create_model
 
 from devcad.geometry.constructions import surface_spec
 from devcad.job.featuretables import SeamTable, TrimTable, cutout_spec, mark_spec
+from devcad.job.simulatetables import SimulateTable
 from devcad.job.tables import JobTable, PanelTable
 
 
@@ -30,6 +31,7 @@ def job_schema() -> dict[str, Any]:
         surface=(surface | None, None),
         panel=(panels, None),
         seam=(list[SeamTable] | None, None),
+        simulate=(SimulateTable | None, None),
         **features,
     )
     return {

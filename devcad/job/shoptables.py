@@ -260,7 +260,9 @@ class LabelsTable(Table):
 class GlbTable(Table):
     """How glTF files are written."""
 
-    animate: bool | None = Field(None, description="whether they unroll and fold; default false")
+    animate: bool | None = Field(
+        None, description="whether they unroll and fold; default: curved creases and mechanisms"
+    )
 
 
 SHOP: Mapping[str, type[Table]] = {

@@ -152,6 +152,7 @@ class JobTable(Model):
     trim: Tables = None
     edges: EdgesTable | None = None
     seam: Tables = None
+    simulate: dict[str, Any] | None = None
     surface: dict[str, Any] | None = None
     panel: Annotated[list[PanelTable], Field(min_length=1)] | None = None
 

@@ -79,6 +79,14 @@ def make_report(
         "files": [file_entry(written) for written in files],
         "svg_origin": origin,
     }
+    if part.linkages:
+        from devcad.mechanisms import mechanism_rows
+
+        report["mechanisms"] = mechanism_rows(part)
+        from devcad.simulate.figures import figures
+        from devcad.simulate.motion import motion
+
+        report["motion"] = [figures(motion(linkage)) for linkage in part.linkages]
     told: dict[str, Any] = plain(report)
     return told
 
@@ -95,6 +103,7 @@ def _panel(panel: Panel, checks: Sequence[Check]) -> dict[str, Any]:
         "name": panel.name,
         "kind": panel.kind,
         **{key: panel.facts.get(key) for key in PANEL_FACTS},
+        **({"folds": panel.facts["folds"]} if panel.folds else {}),
         "allowed": sorted(allowed),
     }
 

@@ -13,8 +13,8 @@ from devcad.export.outline import hole_role
 from devcad.export.profile import INNER, OUTER
 from devcad.flatten.pattern import Edge, Pattern
 from devcad.geometry.taylor import Array
-from devcad.mesh.hinged import Hinged
 from devcad.part import Part
+from devcad.report.pieces import Piece
 
 FINEST = 1 / 5000
 """How far a drawn line may be from its curve, as a share of the drawing: less than a pixel."""
@@ -44,7 +44,7 @@ def lines_of(part: Part) -> list[list[Line]]:
 
 
 def drawing(
-    part: Part, strips: list[Hinged | None], lines: list[list[Line]]
+    part: Part, pieces: list[Piece | None], lines: list[list[Line]]
 ) -> tuple[str, list[str]]:
     """The SVG element with all patterns, and its layers in their order.
 
@@ -61,8 +61,8 @@ def drawing(
     high = np.max([box[1] for box in boxes], axis=0)
     size = float(np.hypot(*(high - low))) or 1.0
     layers: dict[str, list[str]] = {RULINGS: []}
-    for strip, shift, drawn in zip(strips, shifts, lines, strict=True):
-        if strip is not None:
+    for piece, shift, drawn in zip(pieces, shifts, lines, strict=True):
+        for strip in piece.strips if piece else ():
             ends = (strip.pattern + shift).swapaxes(0, 1)
             layers[RULINGS].append("".join(map(_polygon, ends)))
         for line in drawn:

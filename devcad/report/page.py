@@ -19,12 +19,12 @@ from importlib import resources
 from typing import Any
 
 from devcad import __version__
-from devcad.export.folding import sheet_of, strip_of
 from devcad.part import Part
 from devcad.report import sections
-from devcad.report.data import Piece, part_data
+from devcad.report.data import part_data
 from devcad.report.drawing import drawing, lines_of
 from devcad.report.picture import moving_picture, part_picture
+from devcad.report.pieces import piece_of
 
 SCRIPTS = ("fold.js", "shape.js", "camera.js", "paint.js", "page.js")
 SHADERS = ("surface.vert", "surface.frag", "line.vert", "line.frag")
@@ -41,20 +41,19 @@ def job_page(part: Part, report: dict[str, Any]) -> bytes:
     is cut, which differs from their flat state by less than the mesh's deviation a facet, and by
     the neutral fibre's allowance where there is one.
     """
-    pieces = _pieces(part)
-    strips = [None if piece is None else piece[0] for piece in pieces]
+    pieces = [piece_of(panel) for panel in part.panels]
     lines = lines_of(part)
-    pattern, layers = drawing(part, strips, lines)
+    pattern, layers = drawing(part, pieces, lines)
     picture = part_picture(part, pieces, lines)
     body = [
         sections.header(part, report),
         '<main><div class="columns">',
-        sections.viewer(
-            "".join([PICTURE[0], picture, PICTURE[1]]), any(strip is not None for strip in strips)
-        ),
+        sections.viewer("".join([PICTURE[0], picture, PICTURE[1]]), part, pieces),
         sections.pattern(pattern, layers, len(part.panels) > 1),
         "</div>",
         sections.panels(report),
+        sections.folds(part),
+        sections.motions(report),
         sections.checks(report),
         sections.files(report),
         "</main>",
@@ -69,17 +68,8 @@ def job_page(part: Part, report: dict[str, Any]) -> bytes:
 
 def pictures(part: Part) -> tuple[str, str]:
     """Two SVG texts: the part beside its patterns, and the part that unrolls and closes again."""
-    pieces = _pieces(part)
+    pieces = [piece_of(panel) for panel in part.panels]
     return part_picture(part, pieces, lines_of(part)), moving_picture(part, pieces)
-
-
-def _pieces(part: Part) -> list[Piece | None]:
-    """Of each panel the strip that folds and the sheet on it, None where there is none."""
-    strips = [strip_of(panel) for panel in part.panels]
-    return [
-        None if strip is None else (strip, sheet_of(panel, strip))
-        for panel, strip in zip(part.panels, strips, strict=True)
-    ]
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,17 +8,19 @@ from html import escape
 import numpy as np
 
 from devcad.export.folding import pattern_shifts
+from devcad.flatten.flanks import SCORE
 from devcad.geometry.taylor import Array, rows_cross
-from devcad.mesh.hinged import Hinged, motions, moved
+from devcad.mesh.hinged import Hinged
 from devcad.mesh.lodged import Sheet, edges
 from devcad.part import Part
-from devcad.report.data import Piece
 from devcad.report.drawing import Line
+from devcad.report.pieces import Piece
 
 SUN = np.array([-0.45, 0.55, 0.70]) / np.linalg.norm([-0.45, 0.55, 0.70])  # right, up, viewer
 FRONT, BACK = np.array([236, 179, 101]), np.array([122, 150, 176])  # the sheet's two faces
 SHADE = 0.62  # the light that a face turned away from the sun has
 WIDTH, TALLEST, GAP, MARGIN = 720.0, 520.0, 30.0, 14.0  # px
+SCORED = ' stroke="#2e9e4f" stroke-dasharray="9 4"'
 AZIMUTH, ELEVATION = -65.0, 24.0
 NEARER = 0.03  # of the part: what puts a ruling before the faces beside it
 MOST = 6000
@@ -34,7 +36,7 @@ def part_picture(
     part: Part, pieces: list[Piece | None], lines: list[list[Line]], f: float = 0.0
 ) -> str:
     """The SVG text: on the left the part unrolled by f (0 as built, 1 flat), on the right its
-    patterns, at one scale. ``pieces`` are the panels' strips and sheets, ``lines`` those of their
+    patterns, at one scale. ``pieces`` are what is shown of the panels, ``lines`` those of their
     patterns. Farther faces are drawn first, which is right wherever faces do not reach through one
     another."""
     shifts = pattern_shifts(part)
@@ -42,6 +44,12 @@ def part_picture(
     outlines = [
         [line.points + shift for line in drawn if line.closed]
         for drawn, shift in zip(lines, shifts, strict=True)
+    ]
+    scores = [
+        line.points + shift
+        for drawn, shift in zip(lines, shifts, strict=True)
+        for line in drawn
+        if line.layer == SCORE
     ]
     part_box = _box([points for points, *_ in seen])
     flat_box = _box([loop for loops in outlines for loop in loops])
@@ -58,6 +66,7 @@ def part_picture(
             "</g>",
             f'<g fill="{_colour(FRONT)}" fill-rule="evenodd" stroke="#2b333b" stroke-width="1.2">',
             *(f'<path d="{data}"/>' for data in outline),
+            *(f'<path d="{flat(line)}" fill="none"{SCORED}/>' for line in scores),
         ],
     )
 
@@ -133,10 +142,21 @@ def _document(title: str, height: float, body: list[str]) -> str:
 def _stages(part: Part, pieces: list[Piece | None], stages: list[float]) -> list[list[_Seen]]:
     """What the camera sees of each panel, unrolled by each of ``stages``."""
     shifts = pattern_shifts(part)
-    there = [(*piece, shift) for piece, shift in zip(pieces, shifts, strict=True) if piece]
-    small = sum(len(sheet.triangles) for _, sheet, _ in there) <= MOST
+    there = [(piece, shift) for piece, shift in zip(pieces, shifts, strict=True) if piece]
+    small = sum(len(sheet.triangles) for piece, _ in there for sheet in piece.sheets) <= MOST
     camera = _axes(AZIMUTH, ELEVATION)
-    return [[_seen(*each, f, camera) for each in there] if small else [] for f in stages]
+    return [
+        [
+            _seen(strip, sheet, points @ camera.T)
+            for piece, shift in there
+            for strip, sheet, points in zip(
+                piece.strips, piece.sheets, piece.points(f, shift), strict=True
+            )
+        ]
+        if small
+        else []
+        for f in stages
+    ]
 
 
 def _faces(panels: list[_Seen], place: _Place) -> list[str]:
@@ -154,11 +174,8 @@ def _faces(panels: list[_Seen], place: _Place) -> list[str]:
     return [text for _, text in sorted(items, key=lambda item: round(item[0], 6))]
 
 
-def _seen(
-    strip: Hinged, sheet: Sheet, shift: tuple[float, float], f: float, camera: Array
-) -> _Seen:
-    """A panel, unrolled by f."""
-    points = moved(motions(strip, f, shift)[sheet.body], sheet.flat) @ camera.T
+def _seen(strip: Hinged, sheet: Sheet, points: Array) -> _Seen:
+    """A sheet whose points (n, 3) are there, as the camera sees them."""
     corner = points[sheet.triangles]
     normal = rows_cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)

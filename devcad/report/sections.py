@@ -10,6 +10,7 @@ from urllib.parse import quote
 from devcad import __version__
 from devcad.part import Part
 from devcad.report.drawing import DIMENSIONS, HIDDEN, RULINGS
+from devcad.report.pieces import Piece
 
 LAYERS = {
     RULINGS: "rulings of the mesh",
@@ -19,7 +20,7 @@ LAYERS = {
     "STITCH": "stitch holes",
     "BEND_UP": "bends up",
     "BEND_DOWN": "bends down",
-    "SCORE": "scores",
+    "SCORE": "scored creases",
     "ENGRAVE": "engraving",
     "MARK": "marks",
     "LABEL": "labels",
@@ -42,6 +43,14 @@ FACTS = (
 )
 """What is told of every panel: key of the report, words, unit."""
 CHECKED = ' checked=""'
+EXACT = (
+    "Every length on the part is kept at every position of the slider: its facets turn about the "
+    "rulings as rigid pieces."
+)
+SCORED = (
+    "A sheet with curved creases folds at all of them together: at every position of the slider "
+    "its creases are closed, and its rulings lie on the bent surface, as they do in the pattern."
+)
 IDLE = "Point at a ruling, here or on the pattern; keys , and . go from one to the next."
 KEYS = (
     "Drag to turn, drag with Shift or with two fingers to move, wheel or two fingers to come "
@@ -66,28 +75,35 @@ def header(part: Part, report: dict[str, Any]) -> str:
     return f"<header><h1><bdi>{escape(part.name)}</bdi></h1><p>{told}</p></header>"
 
 
-def viewer(picture: str, folds: bool) -> str:
+def viewer(picture: str, part: Part, pieces: Sequence[Piece | None]) -> str:
     """The part in space with its tools; the picture shows until the script runs, or instead."""
+    there = [piece for piece in pieces if piece is not None]
+    hidden = "" if there else ' hidden=""'
+    moves = any(piece.moves for piece in there)
+    still = "" if moves else ' disabled=""'
+    scored = any(piece.fold is not None for piece in there)
     return f"""<section class="card part" aria-labelledby="part-title">
 <h2 id="part-title">The part</h2>
 <div class="still">{picture}</div>
 <div id="stage" tabindex="0" role="application" aria-label="The part in three dimensions" \
-aria-describedby="keys"{"" if folds else ' hidden=""'}>
+aria-describedby="keys"{hidden}>
 <canvas id="canvas"></canvas>
 <svg id="painted" hidden="" aria-hidden="true"></svg>
 <svg id="overlay" aria-hidden="true"><line id="ruling3d" class="chosen" hidden=""/></svg>
 </div>
-<div class="controls"{"" if folds else ' hidden=""'}>
+<div class="controls"{hidden}>
 <label class="unroll">unroll <input id="unroll" type="range" min="0" max="1000" value="0" \
-aria-describedby="exact"><output id="unrolled" for="unroll">as built</output></label>
-<button id="play" type="button" aria-pressed="false">play</button>
+aria-describedby="exact"{still}><output id="unrolled" for="unroll">as built</output></label>
+<button id="play" type="button" aria-pressed="false"{still}>play</button>
 <button id="home" type="button">reset view</button>
 </div>
-<div class="controls"{"" if folds else ' hidden=""'}>
+<div class="controls"{hidden}>
 <label>colour <select id="colour"><option value="0">sheet</option>\
 <option value="1">curvature</option><option value="2">bend radius</option></select></label>
 <label><input id="show-rulings" type="checkbox" checked=""> rulings</label>
 <label><input id="show-curve" type="checkbox" checked=""> regression curve</label>
+<label{"" if scored else ' hidden=""'}><input id="show-creases" type="checkbox" checked=""> \
+creases</label>
 <svg id="legend" hidden="" viewBox="0 0 300 34" role="img" aria-label="scale of the colours">
 <defs><linearGradient id="scale"><stop id="stop0" offset="0"/><stop id="stop1" offset="0.5"/>\
 <stop id="stop2" offset="1"/></linearGradient></defs>
@@ -96,10 +112,26 @@ aria-describedby="exact"><output id="unrolled" for="unroll">as built</output></l
 <text id="word2" x="300" y="28" text-anchor="end"></text></svg>
 </div>
 <p id="told" role="status" data-idle="{escape(IDLE)}">{escape(IDLE)}</p>
-<p class="note" id="exact">Every length on the part is kept at every position of the slider: its
-facets turn about the rulings as rigid pieces.</p>
+<p class="note" id="exact">{_kept(part, pieces)}</p>
 <p class="note" id="keys">{escape(KEYS)}</p>
 </section>"""
+
+
+def _kept(part: Part, pieces: Sequence[Piece | None]) -> str:
+    """What the slider does to lengths."""
+    words = []
+    if any(piece is not None and piece.fold is None for piece in pieces):
+        words.append(EXACT)
+    if any(piece is not None and piece.fold is not None and piece.moves for piece in pieces):
+        words.append(SCORED)
+    for panel, piece in zip(part.panels, pieces, strict=True):
+        if piece is not None and not piece.moves and piece.fold is not None:
+            name, why = escape(panel.name), escape(piece.fold.why)
+            words.append(
+                f"<bdi>{name}</bdi> stands still, as it has no motion with fixed rulings: "
+                f"<bdi>{why}</bdi>."
+            )
+    return " ".join(words)
 
 
 def pattern(drawn: str, layers: Sequence[str], several: bool) -> str:
@@ -129,7 +161,73 @@ def panels(report: dict[str, Any]) -> str:
         for panel in report["panels"]
     ]
     heads = ["panel", *(f"{words} {unit}".strip() for _, words, unit in FACTS)]
-    return _table("Panels", heads, rows)
+    notes = [
+        f'<p class="note"><bdi>{escape(panel["name"])}</bdi>: <bdi>{escape(note)}</bdi></p>'
+        for panel in report["panels"]
+        for note in panel.get("notes") or ()
+    ]
+    return _table("Panels", heads, rows, "\n".join(notes))
+
+
+def folds(part: Part) -> str:
+    """A table of the curved creases, each with a plot of its fold angle; nothing where there are
+    none."""
+    rows = []
+    for panel in part.panels:
+        for number, fold in enumerate(panel.facts.get("folds") or (), start=1):
+            s, angle = ([row[key] for row in fold["table"]] for key in ("s", "fold_deg"))
+            low, high = min(map(abs, angle)), max(map(abs, angle))
+            even = high - low < 5e-3
+            rows.append(
+                [
+                    f"<bdi>{escape(panel.name)}</bdi>",
+                    str(number),
+                    escape(fold["way"]),
+                    f"{fold['length']:.2f}",
+                    f"{high:.2f}" if even else f"{low:.2f} to {high:.2f}",
+                    _plot(s, [abs(a) for a in angle]),
+                ]
+            )
+    heads = ["panel", "crease", "way", "length mm", "fold angle °", "fold angle along the crease"]
+    return _table("Creases", heads, rows)
+
+
+def _plot(x: Sequence[float], y: Sequence[float]) -> str:
+    """A curve y(x), from 0 up, as a small picture."""
+    width, height, top = 180.0, 36.0, max(y) * 1.08 or 1.0
+    span = x[-1] - x[0] or 1.0
+    places = [
+        (width * (a - x[0]) / span, height * (1.0 - b / top)) for a, b in zip(x, y, strict=True)
+    ]
+    run = "L".join(f"{a:.1f} {b:.1f}" for a, b in places)
+    return (
+        f'<svg class="plot" viewBox="0 0 {width:.0f} {height:.0f}" width="{width:.0f}" '
+        f'height="{height:.0f}" role="img" aria-label="from {y[0]:.2f}° at the start of the crease '
+        f'to {y[-1]:.2f}° at its end"><path class="axis" d="M0 {height:.0f}H{width:.0f}"/>'
+        f'<path class="line SCORE" d="M{run}"/></svg>'
+    )
+
+
+def motions(report: dict[str, Any]) -> str:
+    """A table of the mechanisms' motions, clockwise and counterclockwise; nothing without any."""
+    rows = [
+        [
+            f"<bdi>{escape(', '.join(dict.fromkeys(item['panels'])))}</bdi>",
+            _shown(item["class"]),
+            str(item["degrees_of_freedom"]),
+            *(_both_ways(item.get(key)) for key in ("range_deg", "outside_deg", "inside_deg")),
+            _shown(item.get("mobility")),
+            escape("; ".join(item["notes"])),
+        ]
+        for item in report.get("motion", [])
+    ]
+    heads = ["panels", "class", "freedom", "range °", "outside °", "inside °", "mobility", ""]
+    return _table("Motion", heads, rows)
+
+
+def _both_ways(turns: list[float] | None) -> str:
+    """Two turns as a cell's text."""
+    return "–" if turns is None else f"−{turns[0]:.2f} … +{turns[1]:.2f}"
 
 
 def checks(report: dict[str, Any]) -> str:
@@ -172,7 +270,7 @@ def footer(report: dict[str, Any]) -> str:
     return f"<footer><p>devcad {escape(__version__)}{of}</p></footer>"
 
 
-def _table(title: str, heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+def _table(title: str, heads: Sequence[str], rows: Sequence[Sequence[str]], below: str = "") -> str:
     if not rows:
         return ""
     head = "".join(f'<th scope="col">{escape(word)}</th>' for word in heads)
@@ -181,7 +279,7 @@ def _table(title: str, heads: Sequence[str], rows: Sequence[Sequence[str]]) -> s
 <div class="scroll"><table><thead><tr>{head}</tr></thead>
 <tbody>
 {body}
-</tbody></table></div></section>"""
+</tbody></table></div>{below}</section>"""
 
 
 def _shown(value: Any) -> str:

@@ -95,7 +95,7 @@ def pressed(
 
     Args:
         name: the panel's, for its checks.
-        bend: as in :class:`devcad.assemble.Making`; the first facet stays where it is.
+        bend: as in :class:`devcad.making.Making`; the first facet stays where it is.
         flow: sigma / (E T) of the material in 1/mm where bends are over-bent, else None.
     Raises:
         GeometryError: bends that are too few, too many, too steep, or without room.

@@ -43,12 +43,13 @@ class Station:
 def stations(panel: Panel, every: float, flow: float | None) -> tuple[Station, ...]:
     """The stations of a panel, at most ``every`` mm apart along the longer edge of its blank.
 
-    Where the bending jumps there are two, before and after. () where nothing bends smoothly.
+    Where the bending jumps there are two, before and after. () where nothing bends smoothly, and of
+    a sheet with curved creases, which no roller bends.
 
     Args:
         flow: the material's sigma / (E T) in 1/mm, None where it is unknown.
     """
-    if panel.blank is None or panel.bends:  # bent on a press brake
+    if panel.blank is None or panel.bends or panel.flanks:  # bent on a press brake, or by hand
         return ()
     out: list[Station] = []
     start = np.zeros(2)

@@ -101,7 +101,11 @@ def exports(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Exported | Ex
             return problem
         folder = home / name / part.name
         report = json.loads((folder / "report.json").read_text())
-        return Exported(folder, report, part.thickness, part.tolerance, part.colour)
+        sheets = [
+            each for panel in part.panels for each in (panel.chains if part.thickness else ())
+        ]
+        areas = tuple(sheet.area for sheet in sheets)
+        return Exported(folder, report, part.thickness, part.tolerance, part.colour, areas)
 
     return {name: export(name, text) for name, text in JOBS.items()}
 

@@ -13,13 +13,18 @@ Look = Callable[[Path], dict[str, Any]]
 
 @dataclass(frozen=True)
 class Exported:
-    """A job's folder under out/, its report, and what it was built with (mm, sRGB)."""
+    """A job's folder under out/, its report, and what it was built with (mm, sRGB).
+
+    ``solids`` are the areas (mm2) of the middle surfaces of what becomes a solid each: of the
+    panels, and of the flanks that grooves part in a thick folded one.
+    """
 
     folder: Path
     report: dict[str, Any]
     thickness: float
     tolerance: float
     colour: tuple[float, float, float]
+    solids: tuple[float, ...]
 
     @property
     def name(self) -> str:

@@ -96,14 +96,15 @@ def test_freecad_imports_the_contour_at_true_length(exported: Exported, in_freec
         assert length == pytest.approx(panel["cut_length"], rel=1e-5)  # arcs against the true edge
 
 
-def test_freecad_imports_what_is_engraved_at_its_length(
-    exported: Exported, in_freecad: Look
+@pytest.mark.parametrize("layer", ["ENGRAVE", "SCORE"])
+def test_freecad_imports_what_is_drawn_on_the_sheet_at_its_length(
+    exported: Exported, in_freecad: Look, layer: str
 ) -> None:
     for path in exported.files("dxf"):
         layers = in_freecad(path)["layers"]
-        found = sum(layer["length"] for name, layer in layers.items() if name.startswith("ENGRAVE"))
-        engraved = ezdxf.readfile(path).modelspace().query('*[layer=="ENGRAVE"]')
-        paths = [ezdxf.path.make_path(entity, segments=64) for entity in engraved]
+        found = sum(seen["length"] for name, seen in layers.items() if name.startswith(layer))
+        drawn = ezdxf.readfile(path).modelspace().query(f'*[layer=="{layer}"]')
+        paths = [ezdxf.path.make_path(entity, segments=64) for entity in drawn]
         steps = (pairwise(line.flattening(1e-4)) for line in paths)
         length = sum((b - a).magnitude for pairs in steps for a, b in pairs)
         assert found == pytest.approx(length, rel=1e-5)  # chords of 0.1 um against arcs

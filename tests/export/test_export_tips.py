@@ -20,8 +20,9 @@ from OCP.TopExp import TopExp
 from OCP.TopoDS import TopoDS
 from patches import cosine_cylinder, frustum, gore, helix_tangent, lens, oloid, sphericon
 
-from devcad.assemble import PanelSpec, assemble
+from devcad.assemble import assemble
 from devcad.errors import CheckFailed, GeometryError
+from devcad.making import PanelSpec
 from devcad.pipeline import build, export
 
 TURNED = np.array(

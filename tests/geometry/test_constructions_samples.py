@@ -33,7 +33,9 @@ def surface(name):
 @pytest.mark.parametrize("name", NAMES)
 def test_a_sample_is_developable_and_regular_in_all_its_layers(name):
     half = JOBS[name].get("thickness", 0) / 2
-    for patch in (patch for panel in build(**surface(name)).panels for patch in panel.patches):
+    panels = build(**surface(name)).panels
+    chains = [chain for panel in panels for chain in (panel, *panel.flanks)]
+    for patch in (patch for chain in chains for patch in chain.patches):
         frame = patch.frame(inside(patch, 501))
         speed = np.linalg.norm(patch.jet(inside(patch, 501), 1).c0[1], axis=1).max()
         scale = np.abs(frame.a).max() + np.abs(frame.c).max() + 1e-300

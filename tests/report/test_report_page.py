@@ -159,6 +159,110 @@ def test_several_panels_lie_side_by_side() -> None:
     assert b[:, 1].min() == pytest.approx(a[:, 1].min(), abs=1e-3)
 
 
+# --- curved creases ------------------------------------------------------------------------
+
+
+def around(point: np.ndarray, r: np.ndarray, place: np.ndarray) -> np.ndarray:
+    """The motion (4, 4) that turns by r and carries a point to a place."""
+    out = np.eye(4)
+    out[:3, :3] = r
+    out[:3, 3] = place - r @ point
+    return out
+
+
+def scored(panel: dict[str, Any], f: float) -> np.ndarray:
+    """The points of a sheet with creases at f from the page's own numbers: (n, 3)."""
+    flanks, poses = panel["flanks"], panel["poses"]
+    r = panel["rulings"] // flanks
+    scores = np.zeros((flanks - 1, r, 3))
+    scores[:, :, :2] = panel["scores"].reshape(flanks - 1, r, 2)
+    along = np.zeros_like(scores)
+    along[:, :, :2] = panel["along"].reshape(flanks - 1, r, 2)
+    # the polynomial through the poses, by Lagrange's own formula
+    share = np.array([np.prod([(f - q) / (p - q) for q in poses if q != p]) for p in poses])
+    steps = np.tensordot(share, panel["steps"].reshape(len(poses), r - 1, 6), 1)
+    mus = panel["mus"].reshape(flanks - 1, -1) @ share
+
+    def turned(vector: np.ndarray) -> np.ndarray:
+        size = float(np.linalg.norm(vector))
+        return turn(vector, size) if size else np.eye(3)
+
+    pivot = np.append(panel["pivot"], 0.0)
+    place = (1 - f) * np.array(panel["place"]) + f * (pivot + np.append(panel["shift"], 0.0))
+    anchor = panel["anchor"]
+    motions = {anchor: around(pivot, turned(np.array(panel["turn"]) * (1 - f)), place)}
+    small = [
+        around(scores[0, k + 1], turned(steps[k, :3]), scores[0, k + 1] + steps[k, 3:])
+        for k in range(r - 1)
+    ]
+    for k in range(anchor + 1, r):
+        motions[k] = motions[k - 1] @ small[k - 1]
+    for k in range(anchor - 1, -1, -1):
+        motions[k] = motions[k + 1] @ np.linalg.inv(small[k])
+    for j, parent in enumerate(panel["parents"]):
+        for k in range(r):
+            angle = 2 * np.arcsin(mus[j] * panel["sines"][r * j + k])
+            about = around(scores[j, k], turned(along[j, k] * angle), scores[j, k])
+            motions[r * (j + 1) + k] = motions[r * parent + k] @ about
+    flat = panel["flat"].reshape(-1, 2)
+    points = np.column_stack([flat, np.zeros(len(flat)), np.ones(len(flat))])
+    return np.array(
+        [(motions[b] @ x)[:3] for b, x in zip(panel["body"].tolist(), points, strict=True)]
+    )
+
+
+def test_the_numbers_of_the_page_fold_a_ring_along_its_crease() -> None:
+    """Folded by 2 alpha the crease of radius 100 is a circle of radius 100 cos(alpha)."""
+    part = built("annulus")
+    (panel,) = arrays(Reader(page_of(part)).block("part"))
+    flat = panel["flat"].reshape(-1, 2)
+    start = scored(panel, 0.0)
+    mesh = part.panels[0].mesh.vertices
+    assert np.linalg.norm(mesh[:, None] - start[None], axis=2).min(axis=1).max() < 1e-4  # float32
+    crease = part.panels[0].pattern.drawings[0]
+    (middle, _) = crease.curve(np.linspace(crease.u[0], crease.u[-1], 7))
+    on = np.linalg.norm(flat[:, None] - middle, axis=2).argmin(axis=0)
+    for f in (0.3, 0.7):
+        found = scored(panel, f)
+        a, b, c = found[on[0]], found[on[3]], found[on[6]]
+        sides = [np.linalg.norm(x - y) for x, y in ((a, b), (b, c), (c, a))]
+        twice = np.linalg.norm(np.cross(b - a, c - a))
+        radius = 100.0 * np.cos(np.radians(30.0 * (1 - f)))
+        assert np.prod(sides) / (2.0 * twice) == pytest.approx(radius, abs=2e-4)
+        change = lengths(found, panel["triangles"]) - lengths(start, panel["triangles"])
+        assert np.abs(change).max() < part.tolerance / 50  # chords of arcs
+    np.testing.assert_allclose(scored(panel, 1.0)[:, :2], flat, atol=1e-4)
+
+
+def test_a_page_tells_how_a_sheet_folds() -> None:
+    page = page_of(built("annulus"))
+    reader = Reader(page)
+    assert "valley" in reader.text
+    assert "60.00" in reader.text
+    assert f"{100 * np.pi * 120 / 180:.2f}" in reader.text  # the crease's length
+    assert [a for tag, a in reader.tags if tag == "g" and a.get("data-layer") == "SCORE"]
+    assert [a for tag, a in reader.tags if a.get("data-toggles") == "SCORE"]
+    picture = ElementTree.fromstring(picture_in(page))
+    faces = [e for e in picture.iter() if e.get("stroke", "none") == e.get("fill")]
+    assert len(faces) == len(built("annulus").panels[0].mesh.triangles)  # of both flanks
+    assert len(page) < 200_000
+
+
+def test_a_sheet_that_cannot_fold_says_why_and_stands_still() -> None:
+    reader = Reader(page_of(built("stuck")))
+    assert reader.text.count("bend differently") == 2  # beside the slider, and among the notes
+    (slider,) = [a for _, a in reader.tags if a.get("id") == "unroll"]
+    assert "disabled" in slider
+    (panel,) = arrays(reader.block("part"))
+    still = panel["still"].reshape(-1, 3, 4)
+    points = np.column_stack(
+        [panel["flat"].reshape(-1, 2), 0 * panel["share"], 1 + 0 * panel["share"]]
+    )
+    found = np.einsum("nij,nj->ni", still[panel["body"]], points)
+    mesh = built("stuck").panels[0].mesh.vertices
+    assert np.linalg.norm(mesh[:, None] - found[None], axis=2).min(axis=1).max() < 1e-4
+
+
 # --- the policy ----------------------------------------------------------------------------
 
 

@@ -29,6 +29,7 @@ ROWS = {
     "focal": "Focal",
     "bezier": "Bezier",
     "loft": "Loft",
+    "curved-fold": "CurvedFold",
     "translational": "Translational",
     "pq-strip": "PqStrip",
     "gore": "Gore",
@@ -36,6 +37,7 @@ ROWS = {
     "edge-surface": "EdgeSurface",
     "oloid": "Oloid",
     "sphericon": "Sphericon",
+    "cylindrical-mechanism": "CylindricalMechanism",
 }
 """Each kind's class; it stands in the file of the kind's name."""
 

@@ -6,7 +6,7 @@ from abc import abstractmethod
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Annotated
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import AfterValidator, Field
@@ -42,7 +42,9 @@ class BuiltPanel:
     ``base_closed`` says that the base curve returns to its start point. ``drawings`` are lines
     on the sheet, ``figures`` numbers by name that the report repeats in mm, ``notes`` sentences
     that it repeats: what a user must know of this construction. ``rail_fit`` is given by surfaces
-    that are looked for between rails.
+    that are looked for between rails. ``flanks`` are further chains of the same sheet, each folded
+    along a curved crease. ``holes`` are cut out of it. The sheet lies ``layer`` of its thicknesses
+    behind the patches.
     """
 
     patches: tuple[Patch, ...]
@@ -51,6 +53,36 @@ class BuiltPanel:
     figures: Mapping[str, Figure] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     rail_fit: RailFit | None = None
+    flanks: tuple[Flank, ...] = ()
+    holes: tuple[Hole, ...] = ()
+    layer: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Hole:
+    """A cutout that belongs to the construction, about ``at`` = shares of t and of the extent: a
+    slot with round ends, or with ``square`` a rectangle, ``length`` along e and ``width`` across
+    it. ``notch`` lets it cross the panel's edges."""
+
+    at: tuple[float, float]
+    length: float
+    width: float
+    square: bool = False
+    notch: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Flank:
+    """A chain of a sheet that hangs on an earlier one along a curved crease.
+
+    The crease is its own base curve c0 (v = 0) and the ``side`` edge of the chain number
+    ``parent``: 0 is the panel's ``patches``, k its k-th flank. Patch j lies beside the parent's
+    patch j, over the same domain with the same breaks; its rulings point the same way.
+    """
+
+    patches: tuple[Patch, ...]
+    parent: int
+    side: Literal["base", "top"]
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,6 +7,7 @@ from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
+import numpy.typing as npt
 
 from devcad.errors import GeometryError
 from devcad.geometry import taylor
@@ -31,7 +32,7 @@ SAME_COURSE = 1e-6
 """Two unit vectors along the rails on the two sides of a break that differ by less are one: beyond
 the rounding of a high derivative, and no fit within 1e-6 of the size sees the rest."""
 
-THROUGH_INFLECTIONS = "line-of-curvature works through inflections"
+THROUGH_INFLECTIONS = "use another kind: line-of-curvature works through inflections"
 
 Rulings = Callable[[Array, Array], tuple[Array, Array]]
 """Parameters t (n,) and the curve's series there to the series of c0 and e."""
@@ -52,14 +53,14 @@ def frenet_surface(
     Args:
         rulings: gives c0 and e to order K at least from the curve's series of order K + depth.
         depth: the highest derivative of the curve that c0 and e need.
-        instead: what the remedy against an inflection names, apart from splitting the curve.
+        instead: what the remedy against an inflection tells, apart from splitting the curve.
         require: the kind's own demand on the curve, which has no corner and no inflection there.
     Raises:
         GeometryError: the curve stands still, has a corner or an inflection, or a derivative
             jumps so that the ruling does.
     """
     piece = smooth(curve, "curve", order=depth + 2)  # the bending takes two derivatives more
-    _require_bent(kind, piece, instead)
+    require_bent(kind, piece, instead)
     if require is not None:
         require(piece)
 
@@ -72,7 +73,7 @@ def frenet_surface(
     return one_panel(_joined(kind, piece, whole, rays, extent), curve.closed)
 
 
-def _require_bent(kind: str, piece: Curve, instead: str) -> None:
+def require_bent(kind: str, piece: Curve, instead: str) -> None:
     """Raise a GeometryError where the curvature vanishes: N and B change sides there."""
 
     def bending(t: Array, order: int) -> Array:
@@ -95,7 +96,7 @@ def _require_bent(kind: str, piece: Curve, instead: str) -> None:
         f"{kind}: the curve has an inflection (curvature 0) at t = {at:.6g}",
         value=float(np.sqrt(max(least, 0.0))),
         limit=VANISHES * float(np.sqrt(scale)),
-        remedy=part + (f", or use another kind: {instead}" if instead else ""),
+        remedy=part + (f", or {instead}" if instead else ""),
     )
 
 
@@ -135,14 +136,27 @@ def _joined(kind: str, piece: Curve, whole: Patch, rays: Rays, extent: Extent) -
     """
     if not piece.breaks:
         return (whole,)
-    after = np.array(piece.breaks)
-    before, behind = (_course(whole, t) for t in (np.nextafter(after, piece.domain[0]), after))
-    bends = np.linalg.norm(behind - before, axis=1) > SAME_COURSE
+    bends = rails_bend(whole)
     if not bends.any():
         return (whole,)
+    patches = tuple(strip(side, of, extent) for side, of in sides(piece, rays, bends))
+    for left, right in pairwise(patches):
+        _require_one_front(kind, left, right)
+    return patches
+
+
+def rails_bend(whole: Patch) -> npt.NDArray[np.bool_]:
+    """At which breaks of a patch its rails are not smooth, (number of breaks,)."""
+    after = np.array(whole.breaks)
+    before, behind = (_course(whole, t) for t in (np.nextafter(after, whole.domain[0]), after))
+    return np.asarray(np.linalg.norm(behind - before, axis=1) > SAME_COURSE)
+
+
+def sides(piece: Curve, rays: Rays, bends: npt.NDArray[np.bool_]) -> list[tuple[Curve, Rays]]:
+    """The curve cut at those of its breaks that bend, and the rulings over each side of them."""
+    after = np.array(piece.breaks)
     corners = tuple(after[bends].tolist())
     smooth_breaks = tuple(after[~bends].tolist())
-    sides = replace(piece, breaks=smooth_breaks, corners=corners).pieces()
 
     def of(side: Curve) -> Rays:
         def one_sided(t: Array, order: int) -> tuple[Array, Array, Array | None]:
@@ -150,10 +164,8 @@ def _joined(kind: str, piece: Curve, whole: Patch, rays: Rays, extent: Extent) -
 
         return one_sided
 
-    patches = tuple(strip(side, of(side), extent) for side in sides)
-    for left, right in pairwise(patches):
-        _require_one_front(kind, left, right)
-    return patches
+    parts = replace(piece, breaks=smooth_breaks, corners=corners).pieces()
+    return [(side, of(side)) for side in parts]
 
 
 def _require_one_front(kind: str, before: Patch, after: Patch) -> None:

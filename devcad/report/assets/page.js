@@ -12,11 +12,12 @@ const chosen3d = byId("ruling3d");
 const chosen2d = byId("ruling");
 const drawing = byId("drawing");
 const scene = {
-  f: 0, mode: 0, range: told.curvature, rulings: true, curve: true,
+  f: 0, mode: 0, range: told.curvature, rulings: true, curve: true, creases: true,
   colours: {
     front: told.colour, back: told.colour.map((x, i) => x * [0.92, 0.82, 0.7][i]),
     low: [0.13, 0.4, 0.74], middle: [0.87, 0.86, 0.83], high: [0.76, 0.2, 0.17],
     ruling: [0, 0, 0, 0.35], curve: [0.85, 0.1, 0.5, 1],
+    crease: [0.18, 0.62, 0.31, 1],
   },
 };
 const state = {
@@ -161,10 +162,12 @@ function choose(found) {
 function describe(panel, k) {
   const [a, b] = onDrawing(panel, k);
   const radii = [panel.radii[2 * k], panel.radii[2 * k + 1]].map((r) => (r ? Math.abs(r).toFixed(1) : "flat"));
-  const where = panels.length > 1 ? `${panel.name}, ` : "";
+  const each = panel.rulings / panel.flanks;
+  const flank = panel.flanks > 1 ? `flank ${Math.floor(k / each) + 1}, ` : "";
+  const where = (panels.length > 1 ? `${panel.name}, ` : "") + flank;
   const radius = radii[0] === radii[1] ? radii[0] : radii.join(" to ");
   const bend = radius === "flat" ? "flat there" : `bend radius ${radius} mm`;
-  return `${where}ruling ${k + 1} of ${panel.rulings}: ${Math.hypot(b[0] - a[0], b[1] - a[1]).toFixed(2)} mm long, ${bend}`;
+  return `${where}ruling ${(k % each) + 1} of ${each}: ${Math.hypot(b[0] - a[0], b[1] - a[1]).toFixed(2)} mm long, ${bend}`;
 }
 
 function mark() {
@@ -300,7 +303,7 @@ byId("colour").addEventListener("change", (event) => {
   legend();
   ask();
 });
-for (const key of ["rulings", "curve"])
+for (const key of ["rulings", "curve", "creases"])
   byId(`show-${key}`).addEventListener("change", (event) => {
     scene[key] = event.target.checked;
     ask();

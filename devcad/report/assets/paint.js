@@ -62,11 +62,12 @@ function webglPainter(canvas, shapes, scene) {
     for (const name of ["front", "back", "low", "middle", "high"]) set(surface, "3fv", name, scene.colours[name]);
     set(surface, "1i", "mode", scene.mode);
     set(surface, "1f", "range", scene.range);
-    set(surface, "1f", "bent", 1 - scene.f);
     for (const shape of shapes) {
+      const { panel } = shape;
+      set(surface, "1f", "bent", panel.scores ? 1 : 1 - scene.f);
       feed(surface, "position", shape.position, fresh);
       feed(surface, "normal", shape.normal, fresh);
-      feed(surface, "bend", shape.bend, false);
+      feed(surface, "bend", shape.bend, fresh && Boolean(panel.scores));
       hold(gl.ELEMENT_ARRAY_BUFFER, shape.index, false);
       const kind = shape.index instanceof Uint32Array ? gl.UNSIGNED_INT : gl.UNSIGNED_SHORT;
       gl.drawElements(gl.TRIANGLES, shape.index.length, kind, 0);
@@ -80,6 +81,8 @@ function webglPainter(canvas, shapes, scene) {
         drawLines(shape.curve, gl.LINES, fresh);
         drawLines(shape.curve, gl.POINTS, false);
       }
+      set(line, "4fv", "colour", scene.colours.crease);
+      if (scene.creases && shape.creases.length) drawLines(shape.creases, gl.LINES, fresh);
     }
   };
 }
@@ -88,14 +91,15 @@ function webglPainter(canvas, shapes, scene) {
 function svgPainter(svg, shapes, scene) {
   const make = (name) => svg.appendChild(document.createElementNS(svg.namespaceURI, name));
   const faces = shapes.map((shape) => Array.from({ length: shape.panel.triangles.length / 3 }, () => make("path")));
-  const curve = make("path");
-  curve.setAttribute("class", "curve");
+  const lines = { curve: make("path"), creases: make("path") };
+  for (const name of ["curve", "creases"]) lines[name].setAttribute("class", name);
   const mix = (a, b, x) => a.map((v, i) => v + (b[i] - v) * x);
   const clamp = (x, a, b) => Math.min(Math.max(x, a), b);
 
   function colour(shape, corners, facing) {
     const { panel } = shape;
-    const c = corners.reduce((sum, i) => sum + panel.bending[i], 0) * (1 - scene.f);
+    const bent = (i) => (1 - panel.share[i]) * panel.bent[panel.cell[i]] + panel.share[i] * panel.bent[panel.cell[i] + 1];
+    const c = corners.reduce((sum, i) => sum + panel.bending[i] * bent(i), 0);
     const most = Math.max(Math.abs(corners.reduce((sum, i) => sum + panel.height[i], 0)) * scene.range, 1e-30);
     const { low, middle, high, front, back } = scene.colours;
     const x = clamp(c / most, -1, 1);
@@ -130,12 +134,14 @@ function svgPainter(svg, shapes, scene) {
       path.setAttribute("stroke", scene.rulings ? "none" : fill);
       svg.appendChild(path);
     }
-    svg.appendChild(curve);
-    curve.setAttribute("d", scene.curve ? shapes.map((shape) => {
-      const text = [];
-      for (let i = 0; i < shape.curve.length; i += 3)
-        text.push(`${i % 2 ? "L" : "M"}${project(m, size, ...shape.curve.subarray(i, i + 3)).slice(0, 2).map((x) => x.toFixed(1)).join(" ")}`);
-      return text.join("");
-    }).join("") : "");
+    for (const [name, path] of Object.entries(lines)) {
+      svg.appendChild(path);
+      path.setAttribute("d", scene[name] ? shapes.map((shape) => {
+        const text = [];
+        for (let i = 0; i < shape[name].length; i += 3)
+          text.push(`${i % 2 ? "L" : "M"}${project(m, size, ...shape[name].subarray(i, i + 3)).slice(0, 2).map((x) => x.toFixed(1)).join(" ")}`);
+        return text.join("");
+      }).join("") : "");
+    }
   };
 }

@@ -15,6 +15,7 @@ function shapeOf(panel) {
     bend: new Float32Array(3 * count),
     lines: new Float32Array((thick ? 2 : 1) * 3 * panel.lines.length),
     curve: new Float32Array(3 * panel.curveBody.length),
+    creases: new Float32Array(panel.scores ? 6 * (panel.sines.length - panel.parents.length) : 0),
     middle: new Float32Array(3 * n),
     ends: new Float32Array(6 * panel.rulings),
     across: new Float32Array(6 * panel.rulings), // the shading normals before and after each ruling
@@ -35,10 +36,36 @@ function shapeOf(panel) {
     shape.bend.set([panel.bending[i], panel.height[i], thick ? 1 : 2], 3 * i);
     if (thick) shape.bend.set([panel.bending[i], panel.height[i], -1], 3 * (n + i));
   }
-  const endBody = new panel.beside.constructor(2 * panel.rulings);
-  for (let k = 0; k < 2 * panel.rulings; k++) endBody[k] = panel.beside[k % panel.rulings];
-  shape.endBody = endBody;
   return shape;
+}
+
+/** The bending of a sheet whose rulings do not all bend alike, as it is now. */
+function bendAt(shape) {
+  const { panel, bend, thick } = shape;
+  const n = panel.points;
+  for (let i = 0; i < n; i++) {
+    const k = panel.cell[i];
+    const w = panel.share[i];
+    const c = panel.bending[i] * ((1 - w) * panel.bent[k] + w * panel.bent[k + 1]);
+    bend[3 * i] = c;
+    if (thick) bend[3 * (n + i)] = c;
+  }
+}
+
+/** The curved creases, piece by piece. */
+function creasesAt(shape) {
+  const { panel, creases } = shape;
+  if (!creases.length) return;
+  const r = panel.sines.length / panel.parents.length;
+  const body = Uint32Array.from(panel.sines, (_, i) => r + i);
+  const points = new Float32Array(3 * body.length);
+  carry(panel, panel.scores, body, points, 0);
+  let o = 0;
+  for (let i = 0; i < body.length; i++) {
+    if ((i + 1) % r === 0) continue;
+    creases.set(points.subarray(3 * i, 3 * i + 6), o);
+    o += 6;
+  }
 }
 
 /** The normal of a body, the third column of its motion. */
@@ -72,9 +99,11 @@ function shapeAt(shape, f) {
   const n = panel.points;
   const half = panel.thickness / 2;
   fold(panel, f);
-  carry(panel, panel.flat, panel.body, middle, 0);
-  carry(panel, panel.ends, shape.endBody, shape.ends, 0);
+  sheetAt(panel, middle, 0);
+  endsAt(panel, shape.ends);
   carry(panel, panel.curve, panel.curveBody, shape.curve, 0);
+  if (panel.scores) bendAt(shape);
+  creasesAt(shape);
   crossRulings(shape);
   for (let i = 0; i < n; i++) {
     const k = panel.cell[i];

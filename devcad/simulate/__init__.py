@@ -1,0 +1,1 @@
+"""Motion and forces: folded sheets as bars and hinges, linkages that lie in a cylinder."""
