@@ -6,7 +6,8 @@ they are one sheet: the crease that both sides develop is one curve, in the patt
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -101,7 +102,8 @@ def folded(spec: PanelSpec, how: Making) -> tuple[Panel, Blank, list[Check]]:
     own = shared_out(spec.features, sheet.blanks, sheet.hangings)
     for number, chain in enumerate(chains):
         blank, stuff = sheet.blanks[number], replace(sheet.stuffs[number], features=own[number])
-        panel, _, proven = made(specs[number], surface, stuff, blank, chain, rulings)
+        with _told_of_creases(number, sheet.hangings):
+            panel, _, proven = made(specs[number], surface, stuff, blank, chain, rulings)
         if how.thickness:
             panel, thick = _thickened(panel, bodies[number], how, groove, rulings)
             proven = worst([thick, proven])
@@ -123,6 +125,12 @@ def _refuse(spec: PanelSpec, how: Making) -> None:
         'reference = "front" or "back"': bool(how.thickness) and how.reference != "middle",
         "a gap": spec.gap > 0.0,
     }
+    if spec.groove is not None and not how.thickness:
+        raise JobError(
+            "groove: a sheet without thickness needs none",
+            value=spec.groove,
+            remedy="give the job a thickness, or remove the key groove",
+        )
     for what, given in asked.items():
         if given:
             raise JobError(
@@ -193,7 +201,7 @@ def _bodies(sheet: _Sheet, chains: Sequence[Chain], width: float) -> list[Chain]
             k = int(np.argmin(left))
             if left[k] <= 0.0:
                 raise GeometryError(
-                    f"the groove of {width:.6g} mm leaves nothing of flank {number + 1} at "
+                    f"groove: {width:.6g} mm leaves nothing of flank {number + 1} at "
                     f"t = {t[k]:.6g}",
                     value=width,
                     remedy="make the extent wider there, or the sheet thinner",
@@ -217,12 +225,30 @@ def _groove(sheet: _Sheet, given: float | None, thickness: float) -> float:
         return ROOMY * least
     if given < least:
         raise GeometryError(
-            f"a groove of {given:.6g} mm lets both sides of the crease stand in one another",
+            f"groove: {given:.6g} mm lets both sides of the crease stand in one another",
             value=given,
             limit=least,
             remedy=f"make it {least:.4g} mm wide or more (thickness x tan(half the fold angle))",
         )
     return given
+
+
+@contextmanager
+def _told_of_creases(number: int, hangings: Sequence[Hanging]) -> Iterator[None]:
+    """What leaves a flank over an edge that is a crease, told so."""
+    try:
+        yield
+    except GeometryError as error:
+        sides = [side for parent, _, side in hangings if parent == number]
+        sides += [across(side) for _, child, side in hangings if child == number]
+        before = error.what
+        for side in sides:
+            error.what = error.what.replace(
+                f"leaves the sheet over its edge {side}", "runs over a curved crease"
+            ).replace(f"touches the sheet's edge {side}", "touches a curved crease")
+        if error.what != before:
+            error.remedy = "move it to one side of the crease"
+        raise
 
 
 def _require_whole(flanks: Sequence[Panel], hangings: Sequence[Hanging]) -> None:

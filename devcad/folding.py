@@ -134,7 +134,7 @@ def _sheet(job: Job, how: Simulation, stuff: Stuff | None) -> Material:
 
     given = {
         "youngs": how.youngs or (stuff.youngs_modulus if stuff else None),
-        "poisson": how.poisson or (stuff.poisson if stuff else None),
+        "poisson": stuff.poisson if how.poisson is None and stuff else how.poisson,
         "thickness": how.thickness or job.thickness or None,
     }
     remedies = {

@@ -37,7 +37,7 @@ MESHES = {"stl", "glb", "3mf"}
 """The formats that carry a panel's triangles."""
 CUT_FILES = {"dxf", "svg", "pdf"}
 """The formats that a tool with a kerf follows."""
-CUTTING = ("gap", "cut")
+CUTTING = ("gap", "cut", "groove")
 """The keys of a surface that only the assembly can judge; its errors begin with their names."""
 
 
@@ -70,7 +70,7 @@ def plan(
 
 def _moves(job: Job) -> bool:
     """Whether the job has a mechanism whose motion is known."""
-    mechanisms = [panel.surface for panel in job.panels if hasattr(panel.surface, "linkage")]
+    mechanisms = [panel.surface for panel in _mechanisms(job)]
     if not mechanisms:
         return False
     from devcad.simulate.motion import motion
@@ -78,6 +78,11 @@ def _moves(job: Job) -> bool:
     with suppress(DevcadError):  # what is wrong with it is told when it is built
         return any(motion(surface.linkage()).drive is not None for surface in mechanisms)
     return False
+
+
+def _mechanisms(job: Job) -> list[JobPanel]:
+    """The panels that are mechanisms; partly bent links lie in no tube, and are none."""
+    return [p for p in job.panels if hasattr(p.surface, "linkage") and job.bend == 1.0]
 
 
 def build(
@@ -117,7 +122,7 @@ def build(
             bends=recipe.shop.bends if recipe.shop.bends.mode == "press-brake" else None,
         )
         part = _finished(_named(part, job, sheet), job, recipe, edges)
-        mechanisms = [panel for panel in job.panels if hasattr(panel.surface, "linkage")]
+        mechanisms = _mechanisms(job)
         return _linked(part, job, mechanisms, made) if mechanisms else part
     except DevcadError as error:
         raise _placed(error, job) from None

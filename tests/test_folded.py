@@ -258,6 +258,33 @@ def test_cutouts_and_marks_belong_to_the_flank_they_lie_on() -> None:
     assert np.linalg.svd(flat.vertices - flat.vertices.mean(axis=0))[1][2] < 1e-9
 
 
+NOTCH = '[[cutout]]\nshape = "circle"\ndiameter = 8\nnotch = true\nat = '
+
+
+def test_notches_bite_into_the_outline_of_the_whole_sheet() -> None:
+    """Half discs out of the first and the last ruling, which are straight: the sheet's area less
+    theirs."""
+    panel = annulus(more=f"{NOTCH}[10, 0]\n{NOTCH}[-210, 0]")
+    assert panel.facts["flat_area"] == pytest.approx(4000 * np.pi - 16 * np.pi, rel=1e-12)
+    assert panel.facts["area"] == pytest.approx(4000 * np.pi - 16 * np.pi, rel=1e-12)
+    assert [edge.name for edge in panel.pattern.outline] == [
+        *("start", "start", "cutout", "start", "top"),
+        *("end", "cutout", "end", "end", "base"),
+    ]
+
+
+def test_a_hole_runs_on_over_the_cut_of_a_closed_sheet() -> None:
+    """A ring of 80 mm radius, folded by 80 degrees: a sector of 80 / cos(40) mm radius."""
+    ring = folded(
+        'name = "ring"\n[surface]\nkind = "curved-fold"\nangle = 40\nextent = [-20, 25]\n'
+        'crease = { kind = "circle", radius = 80 }\n'
+        '[[cutout]]\nshape = "circle"\ndiameter = 5\nat_surface = [0, 0.8]'
+    )
+    flat, turn = 80 / np.cos(np.radians(40)), 2 * np.pi * np.cos(np.radians(40))
+    sector = 0.5 * turn * ((flat + 25) ** 2 - (flat - 20) ** 2)
+    assert ring.facts["flat_area"] == pytest.approx(sector - 6.25 * np.pi, rel=1e-12)
+
+
 def _welded(panel: Panel) -> tuple[Array, NDArray[np.int32]]:
     mesh = panel.mesh
     points = np.zeros((mesh.weld.max() + 1, 3))
@@ -275,7 +302,13 @@ def _welded(panel: Panel) -> tuple[Array, NDArray[np.int32]]:
             "",
             '[[cutout]]\nshape = "circle"\ndiameter = 8\nat = [1, 10]',
             GeometryError,
-            "cutout-crosses-edge",
+            "cutout 1 runs over a curved crease by 2.506 mm",
+        ),
+        (
+            "",
+            '[[mark]]\nshape = "line"\nlength = 20\nat = [-10, 10]',
+            GeometryError,
+            "mark 1 runs over a curved crease",
         ),
         (
             "",

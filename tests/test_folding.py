@@ -135,6 +135,16 @@ def test_a_loaded_panel_tells_reactions_stiffness_and_modes(
     assert told["modes"]["hertz"][0] > 0.0
     assert told["folds"] is None
     assert [step["phase"] for step in told["steps"]] == ["fold", "load", "load"]
+    moment = told["reactions"][0]["moment"]  # about the origin: what pulls the end, and the weight
+    assert moment[0] == pytest.approx(weight * 50.0 - 0.01 * 100.0, rel=1e-3)
+    assert not any("strains" in note for note in told["notes"])
+
+
+def test_strains_that_no_sheet_bears_are_told(tmp_path: Path, capsys: Captured) -> None:
+    torn = HELD + 'loads = [{ edge = "end", force = [0, 1e5, 0] }]\n'
+    job = write(tmp_path, STRIP, top=STEEL, simulate=torn)
+    assert run(["fold", job, "-o", str(tmp_path / "out")]) == 0
+    assert "note: strains reach" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(
@@ -153,6 +163,13 @@ def test_a_loaded_panel_tells_reactions_stiffness_and_modes(
             "simulate.loads[0]: the place [30, 10] lies outside",
         ),
         (STEEL, HELD + "cells = 2000\nacross = 400", 2, "not TOML"),
+        (STEEL, HELD + "poisson = -1.0\n", 2, "simulate.poisson: must be greater than -1"),
+        (
+            STEEL,
+            HELD + "poisson = 0.0\ncoefficients = 'filipov-2017'\n",
+            3,
+            "> simulate: crossed panel 0 is",
+        ),
         (STEEL, PULLED + 'panel = "other"\n', 2, 'simulate.panel: no panel "other"'),
         (
             "thickness = 1",

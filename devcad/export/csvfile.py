@@ -18,12 +18,19 @@ from devcad.export import Written
 
 DECIMALS = 9
 """Of a number in a cell; a picometre, a billionth of a degree."""
+DIGITS = 15
+MOST_DECIMALS = 24
+"""Of a figure in a cell: its significant digits, and its decimals however small it is."""
 RISKY = ("=", "+", "-", "@", "'")
 """What a text must not begin with: four signs of a formula, and the apostrophe that guards."""
 _NUMBER = re.compile(r"-?\d+(\.\d+)?")
 _CONTROLS = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028\u2029]+")
 
 Cell = str | int | float | bool | None
+
+
+class Figure(float):
+    """A number whose size is not known before, such as a force: 15 significant digits of it."""
 
 
 def to_bytes(header: Sequence[str], rows: Iterable[Sequence[Cell]]) -> bytes:
@@ -43,7 +50,8 @@ def to_bytes(header: Sequence[str], rows: Iterable[Sequence[Cell]]) -> bytes:
 
 
 def cell_text(cell: Cell) -> str:
-    """A cell as it is written: "" for None, at most 9 decimals, texts on one line and guarded.
+    """A cell as it is written: "" for None, at most 9 decimals (15 digits of a figure), texts on
+    one line and guarded.
 
     Raises:
         ValueError: a number that is not finite.
@@ -58,7 +66,11 @@ def cell_text(cell: Cell) -> str:
         return str(cell)
     if not math.isfinite(cell):
         raise ValueError(f"{cell} is no number of a table")
-    text = f"{cell:.{DECIMALS}f}".rstrip("0").rstrip(".")
+    decimals = DECIMALS
+    if isinstance(cell, Figure):
+        size = math.floor(math.log10(abs(cell))) if cell else 0
+        decimals = min(max(DIGITS - 1 - size, 1), MOST_DECIMALS)
+    text = f"{cell:.{decimals}f}".rstrip("0").rstrip(".")
     return "0" if text == "-0" else text
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from devcad.export import Written
-from devcad.export.csvfile import Cell, write_table
+from devcad.export.csvfile import Cell, Figure, write_table
 from devcad.export.glbframes import Key, Moving, write_frames
 from devcad.simulate.net import Net
 from devcad.simulate.outcome import KINDS, Outcome, State
@@ -102,24 +102,27 @@ def _steps(outcome: Outcome, path: Path) -> Written:
                 _short(state.strain),
                 state.furthest,
                 state.rms,
-                *(float(value) for value in state.reactions.sum(axis=0)),
+                *(Figure(value) for value in state.reactions.sum(axis=0)),
             ]
         )
     return write_table(path, "csv", header, rows)
 
 
 def _nodes(outcome: Outcome, path: Path) -> Written:
-    """A row a node and step: its place in the pattern, in space, and what holds it there."""
+    """A row a node and step: its place in the pattern, in space, and the force and moment that hold
+    it there."""
     header = ["step", "node", "pattern_x", "pattern_y", *AXES]
     header += [f"reaction_{axis}_N" for axis in AXES]
+    header += [f"moment_{axis}_N_mm" for axis in AXES]
     flat = outcome.net.flat.tolist()
     rows: list[list[Cell]] = []
     for number, state in enumerate(outcome.states):
-        holding = np.any(state.reactions != 0.0, axis=1).tolist()
-        reactions: list[list[float]] = state.reactions.tolist()
+        bearing = np.concatenate([state.reactions, state.moments], axis=1)
+        holding = np.any(bearing != 0.0, axis=1).tolist()
+        reactions: list[list[Cell]] = [[Figure(x) for x in row] for row in bearing.tolist()]
         for node, (place, point) in enumerate(zip(flat, state.positions.tolist(), strict=True)):
-            held: list[Cell] = [*reactions[node]] if holding[node] else [None] * 3
-            rows.append([number, node, *place, *point, *held])
+            held: list[Cell] = reactions[node] if holding[node] else [None] * 6
+            rows.append([number, node, *place, *(Figure(x) for x in point), *held])
     return write_table(path, "csv", header, rows)
 
 

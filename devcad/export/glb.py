@@ -9,9 +9,8 @@ its ``uv_offset_mm`` for several.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
@@ -20,16 +19,12 @@ from numpy.typing import NDArray
 
 from devcad import __version__
 from devcad.checks import Check, at_most
-from devcad.errors import LimitError
 from devcad.export import Options, Written
 from devcad.export.atlas import atlas
 from devcad.export.binary import FLOAT32_STEP, apart, blocks, bounds, demanded, opened, torn
+from devcad.export.glbfile import write_container
 from devcad.export.glbread import (
-    BIN_CHUNK,
     CHECK,
-    JSON_CHUNK,
-    MAGIC,
-    VERSION,
     Json,
     Stored,
     accessor,
@@ -50,7 +45,6 @@ VERTEX_TARGET, INDEX_TARGET = 34962, 34963
 FLOAT = 5126
 INDEX_TYPES = {2: 5123, 4: 5125}  # bytes an index -> component type
 MOST_SHORT_VERTICES = 0xFFFF  # 65535 restarts a strip and is no index
-MOST_BYTES = 0xFFFFFFFF  # the file's length is a 32-bit number
 
 METALLIC, ROUGHNESS = 0.2, 0.6  # a metal of 1.0 is black in a viewer without an environment
 NORMAL_LIMIT = 1e-6
@@ -78,12 +72,14 @@ class _Piece:
 def write(part: Part, folder: Path, options: Options) -> list[Written]:
     """One file ``<part>.glb`` in the folder, read back.
 
-    With ``options.glb_animate`` the part folds (glbmotion.py), a mechanism moves (glbrigid.py).
+    With ``options.glb_animate`` the part folds (glbmotion.py), a mechanism moves (glbrigid.py);
+    where it is None a part with a motion of its own does, as long as that keeps the tolerance.
     ``max_deviation`` is the mesh's own certified deviation plus the measured rounding to float32,
-    the largest over the panels, and what the joints add. ``checks`` holds that rounding for each
-    panel as ``glb-readback``, behind them that of the motion; normals, texture places, indices and
-    bounds that were read are compared too. Triangles that use a vertex twice are left out. Normals
-    are written with unit length.
+    the largest over the panels, and what the joints add to the part as built and to the flat one;
+    what lies between the keys of a motion has a limit of its own. ``checks`` holds that rounding
+    for each panel as ``glb-readback``, behind them that of the motion; normals, texture places,
+    indices and bounds that were read are compared too. Triangles that use a vertex twice are left
+    out. Normals are written with unit length.
 
     Raises:
         CheckFailed: ``glb-readback``, the file does not hold the mesh.
@@ -93,14 +89,27 @@ def write(part: Part, folder: Path, options: Options) -> list[Written]:
         Khronos, glTF 2.0 Specification, sections 3.6 to 3.9 and 4.4.
     """
     path = folder / f"{part.name}.glb"
+    if options.glb_animate is not None:
+        return [_written(part, path, animate=options.glb_animate)]
+    file = _written(part, path, animate=_has_motion(part))
+    if _has_motion(part) and file.max_deviation > part.tolerance:
+        note = f"stands still: joints put its points {file.max_deviation:.3g} mm off"
+        file = replace(_written(part, path, animate=False), note=note)
+    return [file]
+
+
+def _has_motion(part: Part) -> bool:
+    """Whether the part has a motion of its own: curved creases, or a mechanism."""
+    return bool(part.linkages) or any(panel.folds for panel in part.panels)
+
+
+def _written(part: Part, path: Path, *, animate: bool) -> Written:
     pieces = _pieces(part)
     document = _document(part, pieces)
     motion = b""
     bones: list[Skeleton | Rig | None] = []
     size = sum(sum(piece.sizes) for piece in pieces)
     swung: list[Swing] = []
-    own = bool(part.linkages) or any(panel.folds for panel in part.panels)
-    animate = own if options.glb_animate is None else options.glb_animate
     if animate and part.linkages:
         from devcad.export import glbrigid  # few parts are mechanisms
 
@@ -112,33 +121,22 @@ def write(part: Part, folder: Path, options: Options) -> list[Written]:
         bones = skeletons(part)
         motion = animated(document, bones, size)
     size += len(motion)
-    text = json.dumps(document, separators=(",", ":"), allow_nan=False).encode()
-    text = text.ljust(_padded(len(text)))
-    total = 12 + 8 + len(text) + 8 + size
-    if total > MOST_BYTES:
-        raise LimitError(
-            f"a GLB file of {total} bytes, limit {MOST_BYTES}",
-            place=path.name,
-            value=total,
-            limit=MOST_BYTES,
-            remedy="raise the tolerance",
-        )
-    with opened(path, "wb") as stream:
-        stream.write(np.array([MAGIC, VERSION, total, len(text), JSON_CHUNK], "<u4").tobytes())
-        stream.write(text)
-        stream.write(np.array([size, BIN_CHUNK], "<u4").tobytes())
+
+    def binary(stream: BinaryIO) -> None:
         for piece in pieces:
             _write_piece(stream, piece)
         stream.write(motion)
-    checks = _read_back(path, pieces, total, bones)
-    if swung:
-        checks += glbrigid.proven(path, part, total, swung)
+
+    total = write_container(path, document, size, binary, "raise the tolerance")
+    checks, placed = _read_back(path, pieces, total, bones)
     deviation = max(
         piece.panel.mesh.deviation + check.value
         for piece, check in zip(pieces, checks, strict=False)
     )
-    deviation += max((check.value for check in checks[len(pieces) :]), default=0.0)
-    return [Written(path, "glb", float(deviation), checks)]
+    deviation += max(placed, default=0.0)
+    if swung:
+        checks += glbrigid.proven(path, part, total, swung)
+    return Written(path, "glb", float(deviation), checks)
 
 
 def linear(colour: tuple[float, float, float]) -> list[float]:
@@ -311,11 +309,12 @@ def _bounds(vertices: Array) -> Json:
 
 def _read_back(
     path: Path, pieces: list[_Piece], total: int, bones: Sequence[Skeleton | Rig | None]
-) -> tuple[Check, ...]:
+) -> tuple[tuple[Check, ...], list[float]]:
     """Parse the file by its own tables and compare it with the meshes, then its motion with theirs:
-    a check for every panel, then one or two for every panel that moves."""
+    a check for every panel, then one or two for every panel that moves; and how far the joints of
+    these put its points off, mm."""
     moved: list[Check] = []
-    folded: list[Check] = []
+    folded: list[Sequence[Check]] = []
     with opened(path, "rb") as stream:
         document, start = parse(stream, path, total)
         for node, piece in zip(document["nodes"], pieces, strict=False):  # joints come behind
@@ -334,8 +333,9 @@ def _read_back(
             if skeleton is not None:
                 from devcad.export.glbplayed import folds
 
-                folded += demanded(folds(stream, start, document, number, skeleton), path)
-    return (*moved, *folded)
+                folded.append(demanded(folds(stream, start, document, number, skeleton), path))
+    placed = [checks[0].value for checks in folded]
+    return (*moved, *(check for checks in folded for check in checks)), placed
 
 
 def _holds(stored: dict[str, Stored], told: Json, piece: _Piece) -> bool:

@@ -9,7 +9,6 @@ and UV0 as in glb.py.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -20,7 +19,6 @@ from numpy.typing import NDArray
 
 from devcad import __version__
 from devcad.checks import Check, at_most
-from devcad.errors import LimitError
 from devcad.export import Written
 from devcad.export.binary import FLOAT32_STEP, demanded, opened
 from devcad.export.glb import (
@@ -28,18 +26,14 @@ from devcad.export.glb import (
     INDEX_TARGET,
     INDEX_TYPES,
     METALLIC,
-    MOST_BYTES,
     MOST_SHORT_VERTICES,
     ROUGHNESS,
     VERTEX_TARGET,
     linear,
 )
+from devcad.export.glbfile import write_container
 from devcad.export.glbread import (
-    BIN_CHUNK,
     CHECK,
-    JSON_CHUNK,
-    MAGIC,
-    VERSION,
     Json,
     accessor,
     parse,
@@ -90,22 +84,13 @@ def write_frames(
     book = _Book()
     document = _document(meshes, keys, rest, colour, name, dict(extras or {}), book)
     document["buffers"] = [{"byteLength": len(book.data)}]
-    text = json.dumps(document, separators=(",", ":"), allow_nan=False).encode()
-    text = text.ljust(-(-len(text) // 4) * 4)
-    total = 12 + 8 + len(text) + 8 + len(book.data)
-    if total > MOST_BYTES:
-        raise LimitError(
-            f"a GLB file of {total} bytes, limit {MOST_BYTES}",
-            place=path.name,
-            value=total,
-            limit=MOST_BYTES,
-            remedy="take fewer frames or fewer cells",
-        )
-    with opened(path, "wb") as stream:
-        stream.write(np.array([MAGIC, VERSION, total, len(text), JSON_CHUNK], "<u4").tobytes())
-        stream.write(text)
-        stream.write(np.array([len(book.data), BIN_CHUNK], "<u4").tobytes())
-        stream.write(book.data)
+    total = write_container(
+        path,
+        document,
+        len(book.data),
+        lambda stream: stream.write(book.data),
+        "take fewer frames or fewer cells",
+    )
     checks = _read_back(path, total, meshes, keys)
     return Written(path, "glb", max(check.value for check in checks), checks)
 

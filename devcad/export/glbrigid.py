@@ -2,15 +2,17 @@
 
 The static file stays what it is; an animation "motion" comes behind, of 8 s, that begins and ends
 in the conformal pose. A mechanism whose input goes all the way round goes round once; another
-swings to the one stop and to the other, as a cosine, so that it comes to a toggle, where a link
-would have no bound to its speed, as gently as it leaves it. Turns are exact at every time where a
-link turns evenly, and between keys all points are within a tenth of the part's tolerance.
+swings to the one stop and to the other, as a cosine, so that at a toggle, where links would have no
+bound to their speed, they turn back at a finite one; the stops are keys. Turns are exact at every
+time where a link turns evenly, and between keys all points are within a tenth of the part's
+tolerance.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import BinaryIO
 
@@ -19,7 +21,7 @@ import numpy as np
 from devcad.checks import Check, at_most
 from devcad.export.binary import FLOAT32_STEP, demanded, opened
 from devcad.export.glbread import CHECK, Json, accessor, parse
-from devcad.geometry.linkage import Linkage
+from devcad.geometry.linkage import TURN, Linkage
 from devcad.geometry.taylor import Array
 from devcad.part import Part
 from devcad.simulate.bodies import Complex
@@ -29,7 +31,9 @@ from devcad.units import METRES_PER_MM
 FLOAT = 5126
 SECONDS = 8.0
 FEWEST, MOST = 32, 4096
-"""Keys of an animation, but one."""
+"""Keys of an animation, but one to three."""
+SHORT = 1e-3
+"""Seconds: a stop that is nearer to the beginning is there."""
 SHARE = 0.1
 """Of the part's tolerance, that points may leave their paths between two keys."""
 UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])  # (x, y, z) -> (x, z, -y)
@@ -73,21 +77,41 @@ def _swing(found: Motion, nodes: dict[int, int], limit: float) -> Swing:
     """As many keys as keep points within the limit of their paths."""
     count = FEWEST
     while True:
-        seconds = np.linspace(0.0, SECONDS, 2 * count + 1)
+        seconds = _seconds(found, count)
         seen = track(found, _input(found, seconds))
         if count >= MOST or _bulge(found, seen) <= limit:
             return Swing(found, seconds[::2], _every_second(seen), nodes)
         count *= 2
 
 
+def _seconds(found: Motion, count: int) -> Array:
+    """The times of about ``count`` keys, and between each two the middle. The stops are keys: at a
+    toggle the other links turn back at full speed."""
+    stops = [0.0, SECONDS]
+    if not found.whole:
+        first = (0.25 + _lead(found) / TURN) * SECONDS
+        stops[1:1] = [s for s in (first, first + 0.5 * SECONDS) if SHORT < s < SECONDS - SHORT]
+    pieces = [
+        np.linspace(a, b, 2 * math.ceil(count * (b - a) / SECONDS) + 1)[:-1]
+        for a, b in pairwise(stops)
+    ]
+    return np.concatenate([*pieces, [SECONDS]])
+
+
 def _input(found: Motion, seconds: Array) -> Array:
     """The input's turn at times: 0 first and last."""
     low, high = found.stretch()
-    phase = seconds / SECONDS * 2.0 * math.pi
+    phase = seconds / SECONDS * TURN
     if found.whole:
         return phase
     middle, half = 0.5 * (low + high), 0.5 * (high - low)
-    return middle + half * np.sin(phase - math.asin(min(max(middle / half, -1.0), 1.0)))
+    return np.clip(middle + half * np.sin(phase - _lead(found)), low, high)
+
+
+def _lead(found: Motion) -> float:
+    """The phase at which a swing, begun in the conformal pose, is in its middle."""
+    low, high = found.stretch()
+    return math.asin(min(max((low + high) / (high - low), -1.0), 1.0))
 
 
 def _every_second(seen: Track) -> Track:

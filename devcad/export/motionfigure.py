@@ -14,7 +14,7 @@ import numpy as np
 from devcad.export.motionplots import COLOURS, FAINT, INK, RING, ascii_only, plots, text
 from devcad.export.svgpaths import NAMESPACE
 from devcad.geometry.taylor import Array
-from devcad.simulate.bodies import Arc
+from devcad.simulate.bodies import Arc, Complex
 from devcad.simulate.drives import FourBarDrive, RingDrive
 from devcad.simulate.fourbar import grashof
 from devcad.simulate.motion import Motion, Track, track
@@ -23,6 +23,8 @@ WIDTH, HEIGHT = 260.0, 206.0  # mm
 BOX = (8.0, 26.0, 122.0, 138.0)  # left, top, right, bottom of the cross-section
 WORDS = 146.0  # top of the words under the cross-section
 SAMPLES = 361
+LARGER = 3.0
+"""A cylinder whose radius is more than that many times as large as its links is not all shown."""
 
 
 def figure(found: Motion, title: str) -> str:
@@ -70,11 +72,7 @@ def _section(found: Motion) -> Iterator[str]:
         return centre[0] + away.real, centre[1] - away.imag
 
     yield text(left, top - 2, "cross-section, seen from the tip of the axis", weight="bold")
-    x, y = place(0.0)
-    yield (
-        f'<circle cx="{x:.3f}" cy="{y:.3f}" r="{found.linkage.radius * scale:.3f}" fill="none"'
-        f' stroke="{FAINT}" stroke-width="0.2" stroke-dasharray="2 1.2"/>'
-    )
+    yield from _cylinder(*place(0.0), found.linkage.radius * scale)
     order = sorted(range(len(turns)), key=lambda k: shown[k] == 1.0)
     for k in order:
         yield f'<g fill="none" stroke-opacity="{shown[k]:g}" fill-opacity="{shown[k]:g}">'
@@ -97,6 +95,20 @@ def _section(found: Motion) -> Iterator[str]:
     yield from _bar(scale)
 
 
+def _cylinder(x: float, y: float, radius: float) -> Iterator[str]:
+    """The reference cylinder, cut off at the box where it is larger."""
+    left, top, right, bottom = BOX
+    cut = ""
+    if 2.0 * radius > right - left:
+        box = f'x="{left:g}" y="{top:g}" width="{right - left:g}" height="{bottom - top - 6.0:g}"'
+        yield f'<clipPath id="section"><rect {box}/></clipPath>'
+        cut = ' clip-path="url(#section)"'
+    yield (
+        f'<circle cx="{x:.3f}" cy="{y:.3f}" r="{radius:.3f}" fill="none"'
+        f' stroke="{FAINT}" stroke-width="0.2" stroke-dasharray="2 1.2"{cut}/>'
+    )
+
+
 def _shown(found: Motion) -> tuple[Array, list[float]]:
     """The turns whose poses are drawn, and how strong: the conformal pose last."""
     low, high = found.stretch()
@@ -111,19 +123,30 @@ def _shown(found: Motion) -> tuple[Array, list[float]]:
 
 
 def _scale(found: Motion, poses: Track) -> tuple[complex, float]:
-    """The middle of what is drawn, and mm of paper a mm."""
-    points = [np.array([1.0, 1j, -1.0, -1j]) * found.linkage.radius]
+    """The middle of what is drawn, and mm of paper a mm. Of a cylinder much larger than its links
+    only the part near to them."""
+    points: list[Complex] = []
     for k, arc in enumerate(found.arcs):
         along = arc.start + arc.sweep * np.linspace(0.0, 1.0, 13)
         turned = np.exp(1j * (poses.turns[:, k, None] + along))
         points.append((poses.shifts[:, k, None] + arc.radius * turned).ravel())
-    every = np.concatenate(points)
-    low = complex(every.real.min(), every.imag.min())
-    high = complex(every.real.max(), every.imag.max())
+    low, high = _box(points)
+    if max((high - low).real, (high - low).imag) * LARGER > found.linkage.radius:
+        round_it = found.linkage.radius * np.exp(0.5j * np.pi * np.arange(4))
+        low, high = _box([*points, round_it])
     size = high - low
     left, top, right, bottom = BOX
     return 0.5 * (low + high), min(
         (right - left - 4.0) / size.real, (bottom - top - 12.0) / size.imag
+    )
+
+
+def _box(points: list[Complex]) -> tuple[complex, complex]:
+    """The corners of the box about points."""
+    every = np.concatenate(points)
+    return (
+        complex(every.real.min(), every.imag.min()),
+        complex(every.real.max(), every.imag.max()),
     )
 
 

@@ -13,6 +13,8 @@ from devcad.flatten.pattern import Edge, Pattern
 from devcad.geometry.creasing import Crease, Side, heading
 from devcad.geometry.taylor import Array
 
+SIDES = ("start", "top", "end", "base")
+"""The sides of a flank, in the order of its outline."""
 SCORE = "SCORE"
 """The name of curved creases among a pattern's drawings."""
 Hanging = tuple[int, int, Side]
@@ -53,16 +55,17 @@ def one_sheet(patterns: Sequence[Pattern], hangings: Sequence[Hanging]) -> Patte
     """The pattern of a whole sheet from those of its flanks: one outline, and the creases drawn on
     it as SCORE, in the direction of growing t."""
     order = from_left(hangings)
+    sides = [_sides(pattern) for pattern in patterns]
     outline = (
-        *chained(*(_named(patterns[k], "start") for k in order)),
-        *_named(patterns[order[-1]], "top"),
-        *chained(*(_named(patterns[k], "end") for k in reversed(order))),
-        *_named(patterns[order[0]], "base"),
+        *chained(*(sides[k]["start"] for k in order)),
+        *sides[order[-1]]["top"],
+        *chained(*(sides[k]["end"] for k in reversed(order))),
+        *sides[order[0]]["base"],
     )
     scores = [
         Edge(SCORE, edge.curve, edge.u if side == "top" else edge.u[::-1].copy())
         for parent, _, side in hangings
-        for edge in _in_order(patterns[parent], side)
+        for edge in _in_order(sides[parent][side], side)
     ]
     return Pattern(
         outline,
@@ -74,11 +77,17 @@ def one_sheet(patterns: Sequence[Pattern], hangings: Sequence[Hanging]) -> Patte
     )
 
 
-def _named(pattern: Pattern, name: str) -> list[Edge]:
-    return [edge for edge in pattern.outline if edge.name == name]
+def _sides(pattern: Pattern) -> dict[str, list[Edge]]:
+    """The outline by sides, each with the notches that follow upon its edges."""
+    out: dict[str, list[Edge]] = {name: [] for name in SIDES}
+    first = next((k for k, edge in enumerate(pattern.outline) if edge.name in SIDES), 0)
+    name = SIDES[0]
+    for edge in (*pattern.outline[first:], *pattern.outline[:first]):
+        name = edge.name if edge.name in SIDES else name
+        out[name].append(edge)
+    return out
 
 
-def _in_order(pattern: Pattern, side: Side) -> list[Edge]:
+def _in_order(edges: list[Edge], side: Side) -> list[Edge]:
     """The edges of a side, first that with the smallest t: along the base they run back."""
-    edges = _named(pattern, side)
     return edges if side == "top" else edges[::-1]

@@ -13,7 +13,7 @@ from devcad.flatten.blank import Blank
 from devcad.flatten.border import border
 from devcad.flatten.flanks import Hanging, from_left
 from devcad.flatten.polygons import polygon, winding
-from devcad.geometry.taylor import Array
+from devcad.geometry.taylor import Array, rows_dot
 
 TRACED = 1e-4
 """Of a flank's size: how finely its outline is traced to see what lies on it."""
@@ -73,7 +73,7 @@ def _home(
     if placing.at is not None:
         point = np.array(placing.at)
         on = [k for k, contour in enumerate(contours) if winding(contour, point)]
-        away = [float(np.hypot(*(contour - point).T).min()) for contour in contours]
+        away = [_away(contour, point) for contour in contours]
         return (on[0] if on else int(np.argmin(away))), placing
     assert placing.at_surface is not None
     share, across = placing.at_surface
@@ -83,6 +83,14 @@ def _home(
     reach = across * ends[-1]
     at = int(np.clip(np.searchsorted(ends, reach, side="right") - 1, 0, len(order) - 1))
     return order[at], replace(placing, at_surface=(share, float((reach - ends[at]) / widths[at])))
+
+
+def _away(contour: Array, point: Array) -> float:
+    """How far a point (2,) is from the sides of a polygon (k, 2)."""
+    start, side = contour - point, np.roll(contour, -1, axis=0) - contour
+    square = np.maximum(rows_dot(side, side), np.finfo(float).tiny)
+    share = np.clip(-rows_dot(start, side) / square, 0.0, 1.0)
+    return float(np.hypot(*(start + share[:, None] * side).T).min())
 
 
 def _width(blank: Blank, share: float) -> float:

@@ -23,7 +23,7 @@ ROUNDING = 8.0 * float(np.finfo(float).eps)
 """Sums of lengths that differ by a smaller share are equal."""
 TURN = 2.0 * math.pi
 HALF = 1e-12
-"""Radians: a link that is nearer than this to half a turn is one. Degrees are known to 1e-15."""
+"""Radians: a link nearer than this to half a turn spans one. Rounding of degrees is 1e-15."""
 HALVINGS = 200
 """Of a bracket: more than a float has bits, counted from the smallest angle."""
 

@@ -12,7 +12,7 @@ from devcad.geometry.curves import Direction, Flag, Model, Number, Positive, Vec
 
 Point = tuple[Number, Number]
 Steps = Annotated[int, Field(strict=True, ge=1, le=1000)]
-Poisson = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0.0, lt=0.5)]
+Poisson = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=-1.0, lt=0.5)]
 Axes = Annotated[tuple[Literal["x", "y", "z"], ...], Field(min_length=1, max_length=3)]
 EDGES = ("start", "end", "base", "top", "crease")
 
@@ -45,7 +45,7 @@ class SupportTable(_Somewhere):
         ("x", "y", "z"), description="directions of the built part that are held; default all"
     )
     clamp: Flag = Field(
-        False, description="hold the next row of nodes too, so that the edge cannot turn"
+        False, description="hold the sheet's tangent too, so that it cannot turn about the edge"
     )
 
     @model_validator(mode="after")

@@ -243,8 +243,14 @@ def _whole(mesh: Mesh) -> Mesh:
     """The mesh without the points that no triangle uses.
 
     Raises:
-        GeometryError: an edge has not exactly one partner, of a sheet more than one.
+        GeometryError: an edge has not exactly one partner, of a sheet more than one; or all of the
+            sheet is so narrow that its points are one.
     """
+    if not len(mesh.triangles):
+        raise GeometryError(
+            "the sheet is too narrow for its place in space: its points cannot be told apart",
+            remedy="place it nearer to the origin, or make it larger",
+        )
     used, numbered = np.unique(mesh.triangles, return_inverse=True)
     _, weld = np.unique(mesh.weld[used], return_inverse=True)
     triangles = numbered.reshape(-1, 3).astype(np.int32)

@@ -18,6 +18,9 @@ from devcad.simulate.material import Material
 from devcad.simulate.outcome import Outcome, State
 from devcad.simulate.settings import Simulation
 
+ELASTIC = 0.02
+"""A strain that metals, board and stiff plastics do not come back from."""
+
 
 def fold_report(
     part: Part,
@@ -35,6 +38,9 @@ def fold_report(
     below = sum(value < 0.0 for value in (*outcome.modes, *outcome.frequencies))
     if below:
         notes = [*notes, f"{below} modes lie below 0: there the model gives way by itself"]
+    strain = max(state.strain for state in outcome.states)
+    if strain > ELASTIC:
+        notes = [*notes, f"strains reach {100 * strain:.3g} %: few sheets are elastic so far"]
     report = {
         "devcad": __version__,
         "job": part.name,
@@ -58,8 +64,10 @@ def fold_report(
         "folds": _folds(outcome),
         "applied": outcome.applied,
         "reactions": [
-            {"support": support.where.key, "force": force}
-            for support, force in zip(how.supports, outcome.reactions, strict=True)
+            {"support": support.where.key, "force": force, "moment": moment}
+            for support, force, moment in zip(
+                how.supports, outcome.reactions, outcome.turning, strict=True
+            )
         ],
         "loads": [
             {

@@ -98,22 +98,35 @@ def hull_fit(flat: Array, triangles: Indices, material: Material) -> Array:
     )
 
 
-def crossed(flat: Array, quads: Indices, material: Material) -> tuple[Array, Array, Array]:
-    """Areas (A_X, A_Y, A_D) in mm^2, each (m,), of bars of crossed panels W x H.
+def panel_areas(w: Array, h: Array, material: Material) -> tuple[Array, Array, Array]:
+    """Areas (A_X, A_Y, A_D) in mm^2 of the bars of crossed panels w x h, each of the panels' shape.
 
-    A_X is one of the two bars of length W (side 0-1 and 2-3 of the quad), A_Y of length H, A_D
-    a bar along a diagonal. Exact for uniform strains along the sides; the shear stiffness is
-    2 nu / (1 - nu) of the true one: exact for nu = 1/3 only. W and H are means of opposite sides.
+    A_X is one of the two bars of length w, A_Y of length h, A_D a bar along a diagonal. Exact for
+    uniform strains along the sides; the shear stiffness is 2 nu / (1 - nu) of the true one: exact
+    for nu = 1/3 only. An area is negative where a side is sqrt(nu) of the other or less.
+
+    Source:
+        Filipov, Liu, Tachi, Schenk, Paulino, IJSS 124 (2017) 26-45, as geometry.md, 8 has it.
+    """
+    nu, t = material.poisson, material.thickness
+    plane = 2 * (1 - nu * nu)
+    return (
+        np.asarray(t * (h * h - nu * w * w) / (h * plane)),
+        np.asarray(t * (w * w - nu * h * h) / (w * plane)),
+        np.asarray(nu * t * (h * h + w * w) ** 1.5 / (h * w * plane)),
+    )
+
+
+def crossed(flat: Array, quads: Indices, material: Material) -> tuple[Array, Array, Array]:
+    """The ``panel_areas`` (m,) of quads, whose side 0-1 is w: w and h are means of opposite sides.
 
     Raises:
         GeometryError: a panel is so long that an area is not positive; none is clipped.
-    Source:
-        Filipov, Liu, Tachi, Schenk, Paulino, IJSS 124 (2017) 26-45, as geometry.md, 8 has it.
     """
     corners = flat[quads]
     length = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
     w, h = (length[:, 0] + length[:, 2]) / 2, (length[:, 1] + length[:, 3]) / 2
-    nu, t = material.poisson, material.thickness
+    nu = material.poisson
     ratio = np.minimum(h / w, w / h)
     if nu <= 0 or np.any(ratio**2 <= nu):
         worst = int(np.argmin(ratio))
@@ -125,9 +138,4 @@ def crossed(flat: Array, quads: Indices, material: Material) -> tuple[Array, Arr
             remedy='cells that are nearly square, or coefficients = "exact", which has no such'
             " limit",
         )
-    plane = 2 * (1 - nu * nu)
-    return (
-        np.asarray(t * (h * h - nu * w * w) / (h * plane)),
-        np.asarray(t * (w * w - nu * h * h) / (w * plane)),
-        np.asarray(nu * t * (h * h + w * w) ** 1.5 / (h * w * plane)),
-    )
+    return panel_areas(w, h, material)

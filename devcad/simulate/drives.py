@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cmath
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,7 +12,6 @@ import numpy as np
 from devcad.geometry.taylor import Array
 from devcad.simulate.bodies import Complex, Poses, Twists, less_one, turned_about
 from devcad.simulate.fourbar import EQUAL, FourBar, grashof, positions, reach_from, speeds, wrapped
-from devcad.simulate.search import first_failure
 
 REGULAR = 1e-9
 """Of the radius: joints of a ring that are off the regular order by less are in it."""
@@ -160,42 +160,40 @@ class RingDrive:
 
     @property
     def reach(self) -> tuple[float, float]:
-        """How far link 0 can turn back and on until every other joint meets at the axis or the
-        links of a pair lie in line; to 1e-10 of a turn, by search."""
-        return tuple(  # type: ignore[return-value]
-            sign * first_failure(lambda x, sign=sign: self._closes(sign * x), math.pi)  # type: ignore[misc]
-            for sign in (-1.0, 1.0)
-        )
+        """How far link 0 can turn back and on: until every other joint meets at the axis (a = b),
+        or until the other links are square to the rays' base (a > b), |cos(beta)| = b/a. Where it
+        is the shorter one it goes all the way round."""
+        a, b, beta, _ = self._sides()
+        if a < b:
+            return -2.0 * math.pi, 2.0 * math.pi
+        turned = abs(beta)
+        if a == b:
+            return -turned, turned
+        least = math.acos(b / a)
+        low, high = least - turned, math.pi - least - turned
+        return (low, high) if beta > 0.0 else (-high, -low)
 
     @property
     def ends(self) -> tuple[str, str]:
-        """What stops it: joints that meet at the axis, or a toggle."""
-        size = abs(self.joints[0])
-        words = []
-        for x in self.reach:
-            least = np.abs(self._two(np.array([x * (1.0 - 1e-9)]))).min()
-            words.append("joints meet" if least < 1e-6 * size else "toggle")
-        return words[0], words[1]
+        """What stops it: joints that meet at the axis, a toggle, or nothing."""
+        a, b, _, _ = self._sides()
+        word = "whole turn" if a < b else "joints meet" if a == b else "toggle"
+        return word, word
 
-    def _closes(self, x: Array) -> np.ndarray:
-        """Whether even and odd joints are on their own sides of the axis."""
-        p0, p1 = self._two(x)
-        c0, c1 = self.joints[:2]
-        with np.errstate(invalid="ignore"):
-            return np.asarray(
-                ((p0 * c0.conjugate()).real > 0.0) & ((p1 * c1.conjugate()).real > 0.0)
-            )
+    def _sides(self) -> tuple[float, float, float, float]:
+        """a, b, the beta of the conformal pose, and 2 sin(gamma / 2)."""
+        c0, c1, c2 = self.joints[:3]
+        a, b = abs(c1 - c0), abs(c2 - c1)
+        gamma = cmath.phase(c2 / c0)
+        beta = math.remainder(cmath.phase((c1 - c0) / c0) - 0.5 * gamma, 2.0 * math.pi)
+        return a, a if abs(a - b) < EQUAL * a else b, beta, 2.0 * math.sin(0.5 * gamma)
 
     def _two(self, x: Array) -> Complex:
         """Joints 0 and 1 at x, (2, m)."""
-        c0, c1, c2 = self.joints[:3]
+        c0 = self.joints[0]
         ray = c0 / abs(c0)
-        gamma = np.angle(c2 / c0)
-        a, b = abs(c1 - c0), abs(c2 - c1)
-        b = a if abs(a - b) < EQUAL * a else b  # then one root is 2 a sin(beta), the other is 0
-        phi = np.angle((c1 - c0) / ray)
-        sine = 2.0 * math.sin(0.5 * gamma)
-        beta0 = phi - 0.5 * gamma
+        a, b, beta0, sine = self._sides()
+        phi = cmath.phase((self.joints[1] - c0) / ray)
         root = 1.0 if abs(c0) * sine >= a * math.sin(beta0) else -1.0
         beta = beta0 + x
         inside = b * b - (a * np.cos(beta)) ** 2

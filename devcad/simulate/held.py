@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from devcad.errors import GeometryError
 from devcad.geometry.taylor import Array
@@ -25,12 +24,14 @@ RANK = 1e-9
 @dataclass(frozen=True, slots=True)
 class Held:
     """Fixed components: ``nodes`` (s,), ``axes`` (s,) 0 to 2, and the table of the job, from 0,
-    that asked for each first. ``still`` (n,) are the nodes that clamps hold entirely."""
+    that asked for each first. ``clamped`` (c, 2) are the border's edges that cannot turn, and
+    ``bearing`` (n, 3) the table that bears each component's reaction, -1 where none does."""
 
     nodes: Numbers
     axes: Numbers
     tables: Numbers
-    still: NDArray[np.bool_]
+    clamped: Numbers
+    bearing: Numbers
 
 
 def held(net: Net, supports: Sequence[Support]) -> Held:
@@ -39,33 +40,41 @@ def held(net: Net, supports: Sequence[Support]) -> Held:
     Raises:
         GeometryError: a place outside of the sheet, or supports that let the sheet move as a whole.
     """
-    still = np.zeros(len(net.flat), dtype=bool)
     rows: dict[tuple[int, int], int] = {}
+    clamped = [np.zeros((0, 2), dtype=np.intp)]
+    turned: list[tuple[int, int]] = []
+    bearing = np.full((len(net.flat), 3), -1, dtype=np.intp)
     for number, support in enumerate(supports):
         nodes = _nodes(net, support.where)
         edge = support.where.edge
         if support.clamp and edge is not None and edge in net.inner:
-            nodes = np.concatenate([nodes, net.inner[edge]])
-            if len(support.fix) == len(AXES):
-                still[nodes] = True
+            pairs = _line(net, support.where)[1]
+            inner = net.inner[edge]
+            if len(pairs) == 0:  # a border that is a point has no tangent: the next row is held
+                nodes = np.concatenate([nodes, inner])
+            clamped.append(pairs)
+            turned += [(k, AXES.index(axis)) for axis in support.fix for k in inner.tolist()]
+            bearing[nodes] = np.where(bearing[nodes] < 0, number, bearing[nodes])
         for axis in support.fix:
             for node in nodes.tolist():
                 rows.setdefault((node, AXES.index(axis)), number)
     keys = np.array(sorted(rows), dtype=np.intp).reshape(-1, 2)
     tables = np.array([rows[node, axis] for node, axis in keys.tolist()], dtype=np.intp)
-    out = Held(keys[:, 0], keys[:, 1], tables, still)
+    bearing[keys[:, 0], keys[:, 1]] = tables
     if supports:
-        _refuse_free(net, out)
-    return out
+        _refuse_free(net, np.concatenate([keys, np.array(turned, dtype=np.intp).reshape(-1, 2)]))
+    return Held(keys[:, 0], keys[:, 1], tables, np.concatenate(clamped), bearing)
 
 
-def _refuse_free(net: Net, fixed: Held) -> None:
-    """GeometryError where the sheet can move as a rigid body."""
+def _refuse_free(net: Net, fixed: Numbers) -> None:
+    """GeometryError where the sheet can move as a rigid body; ``fixed`` (s, 2) node and axis, the
+    row of nodes beside a clamped border among them."""
+    nodes, axes = fixed.T
     points = net.built - net.built.mean(axis=0)
-    points = points[fixed.nodes] / max(float(np.abs(points).max()), 1e-300)
+    points = points[nodes] / max(float(np.abs(points).max()), 1e-300)
     turns = np.cross(np.eye(3)[None], points[:, None])  # of unit turns about x, y, z
     moves = np.concatenate([np.tile(np.eye(3)[None], (len(points), 1, 1)), turns], axis=1)
-    rows = moves[np.arange(len(points)), :, fixed.axes]
+    rows = moves[np.arange(len(points)), :, axes]
     sizes = np.linalg.svd(rows, compute_uv=False) if len(rows) else np.zeros(0)
     rank = int((sizes > RANK * max(sizes.max(initial=0.0), 1.0)).sum())
     if rank < 6:

@@ -86,7 +86,8 @@ def build(
 
     Args:
         length_scale: L* in mm of the creases, K_F = L_F D / L*, one number or one for each row of
-            ``sheet.creases``; None for creases that keep their fold angle.
+            ``sheet.creases``; None for creases that keep their fold angle, which those shorter
+            than a millionth of their edge do as well.
         coefficients: a name of COEFFICIENTS, or one name for each kind.
         held: (n,) nodes that a clamp holds. A cell all of whose nodes are held does not bend, so
             that the clamp acts at the last held ruling and not half a cell further on.
@@ -202,13 +203,14 @@ def _bending(
         chosen = np.flatnonzero(kinds == kind)
         stiffness[chosen] = table[name](lines.of(chosen), material)
     at = lines.of(creases[:, 0])
-    scale = stiffnesses.KEPT * at.length if length_scale is None else np.asarray(length_scale)
+    kept = stiffnesses.KEPT * at.length
+    scale = kept if length_scale is None else np.asarray(length_scale)
     if not np.all(np.isfinite(scale) & (scale > 0)):
         raise JobError(
             "the length scale of a crease must be > 0 mm",
             value=float(np.min(scale)),
             limit=0.0,
         )
-    whole = stiffnesses.CREASES[names.creases](at, material) / scale
+    whole = stiffnesses.CREASES[names.creases](at, material) / np.maximum(scale, kept)
     stiffness[creases] = (whole * at.share)[:, None]
     return stiffness

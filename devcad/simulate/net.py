@@ -104,6 +104,7 @@ def net_of(panel: Panel, how: Simulation) -> Net:
             f"the simulation would have {total} nodes, limit {MOST_NODES}",
             value=float(total),
             limit=float(MOST_NODES),
+            place="simulate.cells",
             remedy="give fewer cells and across in [simulate]",
         )
     columns: list[Array] = []

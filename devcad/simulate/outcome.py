@@ -21,7 +21,8 @@ class State:
     While it folds, the sheet is laid onto the exact shape with the least sum of squares and
     ``furthest`` and ``rms`` are the distances of its material points from there; under loads it
     stays where it is held, and they are those from the built part. None: no exact shape is known.
-    ``strain`` is the largest of a bar. A state that is not ``stable`` is left at the least push.
+    ``moments`` (n, 3) in N mm are what clamps exert beside the reactions. ``strain`` is the largest
+    of a bar. A state that is not ``stable`` is left at the least push.
     """
 
     phase: Literal["fold", "load"]
@@ -35,6 +36,7 @@ class State:
     stable: bool
     strain: float
     reactions: Array
+    moments: Array
     furthest: float | None
     rms: float | None
 
@@ -56,7 +58,8 @@ class Outcome:
     """A simulation: its states in order, the first the flat (or the built) sheet, and what the
     last one tells.
 
-    ``reactions`` are the sums over each support of the job, N; ``applied`` the sum of the loads.
+    ``reactions`` are the sums over each support of the job, N, ``turning`` their moments about the
+    part's origin, N mm; ``applied`` the sum of the loads.
     ``modes`` are the smallest eigenvalues of the tangent stiffness in N/mm, or where masses are
     known there are ``frequencies`` in Hz; ``mode_shapes`` (k, n, 3). ``angles`` are the fold angles
     of the crease edges in radians, wanted and reached, ``moments`` what each bears, N mm per mm.
@@ -65,6 +68,7 @@ class Outcome:
     net: Net
     states: tuple[State, ...]
     reactions: tuple[Array, ...]
+    turning: tuple[Array, ...]
     applied: Array
     loads: tuple[Loaded, ...]
     modes: tuple[float, ...]

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from devcad.errors import JobError, LimitError
+from devcad.errors import CheckFailed, JobError
 from devcad.geometry.taylor import Array
 from devcad.simulate import energy
 from devcad.simulate.energy import Forces
@@ -22,8 +22,11 @@ HALVINGS = 5  # a step is divided into at most 2^5 before the sheet is let go
 UNSTABLE_HALVINGS = 2  # ... and into 2^2 where what is found is not stable: a bifurcation
 
 
-class ConvergenceError(LimitError):
+@dataclass(eq=False)
+class ConvergenceError(CheckFailed):
     """No equilibrium was found: ``value`` is the residual, ``limit`` its limit, N."""
+
+    check: str = "equilibrium"
 
 
 @dataclass(frozen=True, slots=True)

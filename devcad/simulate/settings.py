@@ -28,8 +28,8 @@ class Where:
 
 @dataclass(frozen=True, slots=True)
 class Support:
-    """Nodes that keep some of their coordinates when loads come; ``clamp`` holds the next row of
-    nodes too, so that the edge cannot turn."""
+    """Nodes that keep some of their coordinates when loads come; with ``clamp`` the sheet cannot
+    turn about the edge either."""
 
     where: Where
     fix: tuple[Axis, ...]

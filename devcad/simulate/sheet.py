@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from devcad.errors import CheckFailed, GeometryError
+from devcad.errors import CheckFailed, GeometryError, JobError
 from devcad.geometry.taylor import Array
 from devcad.simulate.held import Held, forces, held, node_areas, spread
 from devcad.simulate.net import Net
@@ -21,7 +21,7 @@ from devcad.simulate.outcome import KINDS, Loaded, Outcome, State
 from devcad.simulate.settings import Simulation
 
 if TYPE_CHECKING:
-    from devcad.simulate.freedoms import Supports
+    from devcad.simulate.clamps import Grip
     from devcad.simulate.model import Material, Model
     from devcad.simulate.modes import Modes
     from devcad.simulate.path import Run, Step
@@ -59,36 +59,44 @@ def simulate(
         CheckFailed: no equilibrium is found at a step. GeometryError: supports or loads that do
         not meet the sheet, cells that have no model.
     """
+    from devcad.simulate.clamps import gripped
+    from devcad.simulate.freedoms import Supports
     from devcad.simulate.hinges import angles
     from devcad.simulate.model import Sheet, build
 
     fixed = held(net, how.supports)
     masses = None if density is None else density * material.thickness * node_areas(net)
     applied = forces(net, how, masses)
-    model = build(
-        Sheet(net.flat, net.quads, net.triangles, net.creases),
-        material,
-        length_scale=how.length_scale,
-        coefficients=how.coefficients,
-        held=fixed.still,
-    )
+    try:
+        model = build(
+            Sheet(net.flat, net.quads, net.triangles, net.creases),
+            material,
+            length_scale=how.length_scale,
+            coefficients=how.coefficients,
+        )
+    except (GeometryError, JobError) as error:
+        raise error.at(place="simulate") from None
     built = angles(_whole(model, net.built), model.hinges)
     _refuse_turned(model, built)
     wanted = model.folds(built)
     rest = built if formed else model.rest(wanted)
     states = _folded(net, model, rest, how, formed, shapes, listener)
+    supports = Supports(fixed.nodes, fixed.axes, np.zeros(len(fixed.nodes)))
+    grip = gripped(model, states[-1].positions, supports, fixed.clamped, how.coefficients)
+    rest = grip.rest(rest)
     if how.supports:
-        states += _loaded(net, model, rest, how, fixed, applied, states[-1].positions, listener)
+        states += _loaded(net, grip, rest, how, applied, states[-1].positions, listener)
     last = states[-1]
-    end = _whole(model, last.positions)
-    reached = model.folds(angles(end, model.hinges))
-    modes = _modes(model, end, rest, fixed, how.modes, density)
+    reached = model.folds(angles(_whole(model, last.positions), model.hinges))
+    modes = _modes(model, grip, last.positions, rest, how.modes, density)
+    reactions, turning = _reactions(last, fixed, len(how.supports))
     return Outcome(
         net=net,
         states=tuple(states),
-        reactions=_reactions(last, fixed, len(how.supports)),
+        reactions=reactions,
+        turning=turning,
         applied=applied.sum(axis=0),
-        loads=_loads(net, model, rest, how, fixed, states),
+        loads=_loads(net, grip, rest, how, fixed, states),
         modes=tuple(modes.values.tolist()) if modes and density is None else (),
         frequencies=tuple(modes.frequencies.tolist()) if modes and density is not None else (),
         mode_shapes=modes.shapes[:, : len(net.flat)] if modes else np.zeros((0, len(net.flat), 3)),
@@ -174,10 +182,9 @@ def _measured(state: State, shape: Array) -> State:
 
 def _loaded(
     net: Net,
-    model: Model,
+    grip: Grip,
     rest: Array,
     how: Simulation,
-    fixed: Held,
     applied: Array,
     start: Array,
     listener: Listener,
@@ -189,10 +196,10 @@ def _loaded(
 
     run = _found(
         lambda told: fold(
-            model,
-            (Stage(how.load_steps, loads=applied),),
-            supports=_supports(fixed),
-            start=start,
+            grip.model,
+            (Stage(how.load_steps, loads=grip.spread(applied)),),
+            supports=grip.supports,
+            start=grip.whole(start),
             rest=rest,
             listener=told,
         ),
@@ -201,15 +208,12 @@ def _loaded(
         listener,
     )
     count = len(net.flat)
-    states = [_state("load", x.fraction, x, x.positions[:count]) for x in run.steps[1:]]
-    return [_measured(state, net.built) for state in states]
-
-
-def _supports(fixed: Held) -> Supports:
-    """What is held as the path has it, not moved."""
-    from devcad.simulate.freedoms import Supports
-
-    return Supports(fixed.nodes, fixed.axes, np.zeros(len(fixed.nodes)))
+    states = []
+    for step in run.steps[1:]:
+        state = _state("load", step.fraction, step, step.positions[:count])
+        reactions, moments = grip.borne(step.positions, step.reactions, count)
+        states.append(_measured(replace(state, reactions=reactions, moments=moments), net.built))
+    return states
 
 
 def _found(
@@ -260,6 +264,7 @@ def _state(phase: Literal["fold", "load"], share: float, step: Step, points: Arr
         stable=bool(step.stable),
         strain=float(step.strain),
         reactions=step.reactions[: len(points)],
+        moments=np.zeros_like(points),
         furthest=None,
         rms=None,
     )
@@ -285,15 +290,21 @@ def _whole(model: Model, points: Array) -> Array:
 
 
 def _modes(
-    model: Model, points: Array, rest: Array, fixed: Held, count: int, density: float | None
+    model: Model, grip: Grip, points: Array, rest: Array, count: int, density: float | None
 ) -> Modes | None:
-    """The softest deformations of a state; None where none was asked for."""
-    if not count:
-        return None
+    """The softest deformations of a state, as many as it has; None where none was asked for."""
+    from devcad.simulate.freedoms import held
     from devcad.simulate.modes import modes, node_masses
 
+    x = grip.whole(points)
+    hold = held(x, grip.supports)
+    most = int(np.sum(~hold.fixed)) - hold.rigid.shape[1]
+    if min(count, most) < 1:
+        return None
     masses = None if density is None else node_masses(model, density * KG_PER_M3)
-    return modes(model, points, rest, count=count, supports=_supports(fixed), masses=masses)
+    if masses is not None:  # the wall's points do not move
+        masses = np.concatenate([masses, np.zeros(len(grip.wall))])
+    return modes(grip.model, x, rest, count=min(count, most), supports=grip.supports, masses=masses)
 
 
 def _moments(net: Net, model: Model, left: Array) -> Array:
@@ -303,15 +314,20 @@ def _moments(net: Net, model: Model, left: Array) -> Array:
     return np.asarray(springs * left / np.linalg.norm(edges, axis=1))
 
 
-def _reactions(last: State, fixed: Held, count: int) -> tuple[Array, ...]:
-    """The sum of the reactions of each support, (3,) in N."""
-    out = np.zeros((count, 3))
-    np.add.at(out, (fixed.tables, fixed.axes), last.reactions[fixed.nodes, fixed.axes])
-    return tuple(out)
+def _reactions(last: State, fixed: Held, count: int) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
+    """The sum of the reactions of each support, (3,) in N, and its moment about the part's origin,
+    (3,) in N mm."""
+    sums, turning = [], []
+    for number in range(count):
+        own = np.where(fixed.bearing == number, last.reactions, 0.0)
+        mine = (fixed.bearing == number).any(axis=1)
+        sums.append(own.sum(axis=0))
+        turning.append(np.cross(last.positions, own).sum(axis=0) + last.moments[mine].sum(axis=0))
+    return tuple(sums), tuple(turning)
 
 
 def _loads(
-    net: Net, model: Model, rest: Array, how: Simulation, fixed: Held, states: list[State]
+    net: Net, grip: Grip, rest: Array, how: Simulation, fixed: Held, states: list[State]
 ) -> tuple[Loaded, ...]:
     """What each load does in the end."""
     if not how.loads:
@@ -320,7 +336,6 @@ def _loads(
 
     folded = next(state for state in reversed(states) if state.phase == "fold")
     moved = states[-1].positions - folded.positions
-    supports = _supports(fixed)
     out = []
     for load in how.loads:
         nodes, shares = spread(net, load)
@@ -330,7 +345,13 @@ def _loads(
         np.add.at(pattern, nodes, shares[:, None] * force)
         pattern[fixed.nodes, fixed.axes] = 0.0  # what lies on a support is borne at once
         both = [
-            stiffness(model, _whole(model, state.positions), rest, pattern, supports=supports)
+            stiffness(
+                grip.model,
+                grip.whole(state.positions),
+                rest,
+                grip.spread(pattern),
+                supports=grip.supports,
+            )
             if pattern.any()
             else None
             for state in (folded, states[-1])

@@ -76,10 +76,11 @@ def twisting(lines: Lines, material: Material) -> Array:
 def panel_bending(diagonal: Array, corners: Array, material: Material) -> Array:
     """K_B = (0.55 - 0.42 corners / pi) D (D_s / t)^(1/3), N mm, of a panel's short diagonal.
 
-    ``corners`` is the sum of angles called alpha there, radians.
+    ``corners`` is sum(alpha), radians; for a panel of the model ``filipov_bending`` makes it.
 
     Source:
-        Filipov et al., IJSS 124 (2017); the constants are recalled, not read (geometry.md).
+        Filipov et al., IJSS 124 (2017); constants and exponent are recalled, not read
+        (geometry.md, CONFIDENCE 5).
     """
     a, b, power = FILIPOV_FIT
     fit = a - b * corners / np.pi
@@ -87,7 +88,12 @@ def panel_bending(diagonal: Array, corners: Array, material: Material) -> Array:
 
 
 def filipov_bending(lines: Lines, material: Material) -> Array:
-    """(h,) diagonals: ``panel_bending``; alpha are taken as the corners off the diagonal.
+    """(h,) diagonals: ``panel_bending``, sum(alpha) being the panel's two corner angles that the
+    diagonal does not touch: pi for a rectangle, where the factor is 0.13, less for a rhombus along
+    its short diagonal.
+
+    This reading is ours, a reconstruction: the formula was at hand, the paper's figure of alpha was
+    not. Another reading only changes how stiffly panels resist twisting.
 
     Raises:
         JobError: a panel whose K_B would not be positive.
@@ -103,9 +109,18 @@ def filipov_bending(lines: Lines, material: Material) -> Array:
     return np.asarray(lines.share * value)
 
 
+def crease_folding(length: Array, scale: Array, material: Material) -> Array:
+    """K_F = (L_F / L*) D, N mm, of creases ``length`` L_F mm long, of length scale L* = ``scale``.
+
+    Source:
+        Filipov et al., IJSS 124 (2017), as geometry.md, 8 has it.
+    """
+    return np.asarray(material.plate * length / scale)
+
+
 def crease_plate(lines: Lines, material: Material) -> Array:
     """(h,) K_F L* = L_F D, N mm^2."""
-    return np.asarray(material.plate * lines.length)
+    return crease_folding(lines.length, np.ones(1), material)
 
 
 def crease_hull(lines: Lines, material: Material) -> Array:

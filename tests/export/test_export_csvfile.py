@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from devcad.export.csvfile import RISKY, Cell, cell_text, from_bytes, to_bytes, write_table
+from devcad.export.csvfile import RISKY, Cell, Figure, cell_text, from_bytes, to_bytes, write_table
 
 HEADER = ("name", "x", "count")
 
@@ -66,6 +66,15 @@ def test_numbers_have_no_exponent_and_no_idle_zeros(number: float, text: str) ->
 def test_what_is_no_number_is_not_written(number: float) -> None:
     with pytest.raises(ValueError, match="no number"):
         to_bytes(HEADER, [["a", number, 1]])
+
+
+@given(st.floats(1e-8, 1e12), st.sampled_from([-1.0, 1.0]))
+def test_a_figure_keeps_its_digits_however_small_it_is(size: float, sign: float) -> None:
+    text = cell_text(Figure(sign * size))
+    assert "e" not in text
+    assert float(text) == pytest.approx(sign * size, rel=1e-14)  # 15 digits
+    assert cell_text(Figure(-0.0)) == cell_text(Figure(sign * 1e-30)) == "0"
+    assert cell_text(Figure(sign * 100.0)) == cell_text(sign * 100.0)
 
 
 def test_every_row_has_a_cell_for_every_name() -> None:

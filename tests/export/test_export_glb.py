@@ -12,7 +12,7 @@ import trimesh
 from meshes import AREA, SIN_HALF_ANGLE, cone_sheet, cone_shell, moved, part
 
 from devcad.errors import CheckFailed, FileError, LimitError
-from devcad.export import Options, glb
+from devcad.export import Options, glb, glbfile
 from devcad.mesh.mesh import Mesh
 
 COMPONENTS = {5126: ("f", 4), 5123: ("H", 2), 5125: ("I", 4)}
@@ -260,7 +260,7 @@ def test_torn_file_is_noticed(tmp_path, monkeypatch):
 
 
 def test_file_longer_than_its_own_length_can_say_is_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr(glb, "MOST_BYTES", 1000)
+    monkeypatch.setattr(glbfile, "MOST_BYTES", 1000)
     with pytest.raises(LimitError, match="limit 1000"):
         glb.write(part(cone_shell()), tmp_path, Options())
 

@@ -172,3 +172,17 @@ def test_more_keys_where_lengths_are_to_be_kept_better() -> None:
     assert 3 <= len(rig.keys) <= 9
     few, many = (len(_key_states(rig.fold, panel, x)) - 1 for x in (1e-5, 1e-5 / 16**2))
     assert 3 * few <= many <= 5 * few
+
+
+def test_a_motion_that_nobody_asked_for_gives_way_to_the_tolerance(tmp_path: Path) -> None:
+    """Joints of 24 bits put points off by 1e-5 mm, which a tolerance of 1e-6 mm cannot bear."""
+    part = built("annulus")
+    (moving,) = glb.write(part, tmp_path, Options())
+    assert "animations" in File(moving.path).tree and not moving.note
+    (still,) = glb.write(replace(part, tolerance=moving.max_deviation), tmp_path, Options())
+    assert "animations" in File(still.path).tree
+    (still,) = glb.write(
+        replace(part, tolerance=part.panels[0].mesh.deviation), tmp_path, Options()
+    )
+    assert "animations" not in File(still.path).tree
+    assert still.note.startswith("stands still")

@@ -10,6 +10,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from films import File
 
 import devcad
 from devcad.errors import JobError
@@ -99,21 +100,8 @@ def test_the_report_tells_the_motion(tmp_path: Path) -> None:
     assert {file["path"] for file in report["files"]} == {"four-motion.svg", "four-motion.csv"}
 
 
-class File:
-    """A GLB file read by its own tables."""
-
-    def __init__(self, path: Path) -> None:
-        content = path.read_bytes()
-        size = int.from_bytes(content[12:16], "little")
-        self.tree = json.loads(content[20 : 20 + size])
-        self.data = content[28 + size :]
-
-    def numbers(self, index: int) -> np.ndarray:
-        entry = self.tree["accessors"][index]
-        view = self.tree["bufferViews"][entry["bufferView"]]
-        width = {"SCALAR": 1, "VEC3": 3, "VEC4": 4}[entry["type"]]
-        found = np.frombuffer(self.data, "<f4", width * entry["count"], view["byteOffset"])
-        return found.reshape(-1, width).astype(float)
+class Links(File):
+    """A GLB file whose nodes are rigid."""
 
     def posed(self, node: int, time: float) -> np.ndarray:
         """Points in mm, x, y, z as in the job, of a node's mesh at a time."""
@@ -143,7 +131,7 @@ def test_links_turn_about_their_axes_where_the_mechanism_stands(tmp_path: Path) 
     """The joint axis, in space, of two links is the same line at every time."""
     part = built()
     (written,) = glb.write(part, tmp_path, MOVING)
-    file = File(written.path)
+    file = Links(written.path)
     axis = np.array([1.0, 2.0, 2.0]) / 3.0
     (linkage,) = part.linkages
     place = np.array(linkage.place)
@@ -179,10 +167,46 @@ def test_links_turn_about_their_axes_where_the_mechanism_stands(tmp_path: Path) 
     assert {c["target"]["node"] for c in file.tree["animations"][0]["channels"]} == {0, 1, 2}
 
 
+def test_links_turn_back_at_a_toggle_without_leaving_their_joints(tmp_path: Path) -> None:
+    """There coupler and output change their speed at once: with a key there few keys suffice."""
+    part = built()
+    file = File(glb.write(part, tmp_path, MOVING)[0].path)
+    (linkage,) = part.linkages
+    place = np.array(linkage.place)
+    (animation,) = file.tree["animations"]
+    times = file.numbers(animation["samplers"][0]["input"])[:, 0]
+    assert len(times) < 1200
+    found = simulated.motion(linkage)
+    assert [way.end for way in found.directions] == ["toggle", "toggle"]
+    joint = linkage.radius * np.exp(1j * linkage.joints[2])
+    x, y, z = place[:, :3] @ [joint.real, joint.imag, 0.0] + place[:, 3]
+    worst = 0.0
+    for time in np.linspace(0.0, 8.0, 2000).tolist():
+        # coupler and output at the joint between them; metres, y up
+        ends = [file.node(k, time) @ [1e-3 * x, 1e-3 * z, -1e-3 * y, 1.0] for k in (1, 2)]
+        worst = max(worst, 1e3 * float(np.linalg.norm(ends[1] - ends[0])))
+    assert worst < 0.25 * part.tolerance
+
+
+def test_the_figure_shows_links_of_a_much_larger_cylinder(tmp_path: Path) -> None:
+    job = tmp_path / "flat.toml"
+    job.write_text(
+        'name = "flat"\n[surface]\nkind = "cylindrical-mechanism"\n'
+        'links = [10, 20, 30, 20.0001]\nconformal = "crossed"\n'
+    )
+    path = motion.write(devcad.build(job), tmp_path, Options())[0].path
+    circles = [e for e in ElementTree.parse(path).iter() if e.tag.endswith("circle")]
+    cylinder, *joints = circles
+    assert "clip-path" in cylinder.attrib
+    places = np.array([[float(j.attrib["cx"]), float(j.attrib["cy"])] for j in joints])
+    assert np.ptp(places, axis=0).max() > 50.0  # mm of paper
+    assert places.min() > 0.0 and places[:, 0].max() < 130.0
+
+
 def test_without_animation_the_file_is_the_static_one(tmp_path: Path) -> None:
     (tmp_path / "still").mkdir()
-    still = File(glb.write(built(), tmp_path / "still", Options(glb_animate=False))[0].path)
-    moving = File(glb.write(built(), tmp_path, MOVING)[0].path)
+    still = Links(glb.write(built(), tmp_path / "still", Options(glb_animate=False))[0].path)
+    moving = Links(glb.write(built(), tmp_path, MOVING)[0].path)
     assert moving.data.startswith(still.data)
     assert "animations" not in still.tree and moving.tree["nodes"] == still.tree["nodes"]
 
@@ -191,6 +215,6 @@ def test_one_sheet_with_living_hinges_stands_still(tmp_path: Path) -> None:
     """Its links are no bodies of their own; the figure and the table are made all the same."""
     part = built("0, 50, 170, 290", "living")
     assert len(part.panels) == 1
-    file = File(glb.write(part, tmp_path, MOVING)[0].path)
+    file = Links(glb.write(part, tmp_path, MOVING)[0].path)
     assert "animations" not in file.tree
     assert len(motion.write(part, tmp_path, Options())) == 2

@@ -9,6 +9,7 @@ import pytest
 from constructing import build, refusal
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from pydantic import ValidationError
 from scipy.spatial.transform import Rotation
 from strategies import scales
 
@@ -429,3 +430,8 @@ def test_what_does_not_fold_is_refused_with_its_place(name):
     assert told.code == code
     assert re.sub(r"\s+", " ", words) in str(told)
     assert told.remedy
+
+
+def test_no_more_creases_than_can_be_made_in_reasonable_time():
+    with pytest.raises(ValidationError, match="at most 12"):
+        sheet(flat_crease=ARC, fold=10, extent=[-5, 5], right_creases=[1] * 13)

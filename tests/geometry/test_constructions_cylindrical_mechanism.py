@@ -144,6 +144,18 @@ def test_bands_keep_links_apart_that_touch_or_cover_one_another():
     )
 
 
+@pytest.mark.parametrize("way", [1, -1])
+def test_a_link_of_half_a_turn_goes_on_in_the_others_direction(way):
+    # in floats 170 degrees are less than 350 less 180
+    joints = [way * angle for angle in (170, 350, 390, 470)]
+    surface = model(f'radius = 10\njoints = {joints}\nhinge = "living"')
+    (half, *others) = (link.sweep for link in surface.linkage().links)
+    assert half == way * np.pi
+    assert sum(others) == pytest.approx(way * np.pi, abs=1e-13)
+    (sheet,) = surface.build().panels
+    assert np.ptp(sheet.patches[0].domain) < 2.0 * np.pi
+
+
 @pytest.mark.parametrize(
     ("table", "says"),
     [
@@ -153,6 +165,8 @@ def test_bands_keep_links_apart_that_touch_or_cover_one_another():
         ({"radius": 1, "joints": [0, 50, 170, 290], "bands": [0, 0, 1, 1]}, "lie in one another"),
         ({"links": [1, 1, 1, 1], "hinge": "living", "pin": 1}, "does not belong"),
         ({"links": [1, 1, 1, 1], "widths": 1, "pin": 0.3}, "too narrow"),
+        ({"radius": 10, "joints": [0, 50, 170, 290], "reach": 28}, "goes round onto itself"),
+        ({"radius": 10, "joints": [0, 0.01, 170, 290]}, "too short for hinges"),
         ({"links": [1, 1, 1, 1, 1], "conformal": "crossed"}, "no one crossed pose"),
     ],
 )

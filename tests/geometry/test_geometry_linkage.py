@@ -1,5 +1,8 @@
 """Linkages on a circle: closing, radii and joints against the circle's own chords."""
 
+from decimal import Decimal
+from fractions import Fraction
+
 import numpy as np
 import pytest
 
@@ -12,6 +15,7 @@ from devcad.geometry.linkage import (
     is_linkage,
     joints_of,
     open_radius,
+    sweeps_of,
 )
 
 
@@ -48,6 +52,43 @@ def test_radii_are_those_of_the_circle_that_the_chords_were_taken_from():
     # the distance from a change point or from a straight line takes three digits
     np.testing.assert_allclose(crossed_radius(sides[crossed & fair]), 1.0, rtol=1e-11)
     np.testing.assert_allclose(open_radius(sides[~crossed & fair]), 1.0, rtol=1e-11)
+
+
+def exact_radius(sides: list[float], sign: int) -> float:
+    """Parameshvara's formula in fractions; ``sign`` of the shortest side is -1 where crossed."""
+    s, p, q, l = sorted(Fraction(side) for side in sides)  # noqa: E741
+    s *= sign
+    top = (l * q + p * s) * (l * p + q * s) * (q * p + l * s)
+    bottom = (l + q + p - s) * (l + q - p + s) * (l + p - q + s) * (q + p + s - l)
+    square = top / bottom
+    return float((Decimal(square.numerator) / Decimal(square.denominator)).sqrt())
+
+
+@pytest.mark.parametrize("away", [1e-3, 1e-6, 1e-9, 1e-12])
+def test_no_digit_is_lost_near_a_change_point_or_a_straight_line(away):
+    # one part in 1e12 from them the plain formulas keep three digits
+    for sides in ([10.0, 20.0, 30.0, 20.0 + away], [12.0, 18.0, 12.0 + away, 18.0 + 2.5 * away]):
+        if is_grashof([sides])[0]:
+            assert crossed_radius(sides) == pytest.approx(exact_radius(sides, -1), rel=4e-15)
+            radius, sweeps = conformal(sides, "crossed")
+            chords = 2.0 * radius * np.abs(np.sin(0.5 * np.array(sweeps)))
+            np.testing.assert_allclose(chords, sides, rtol=1e-14)
+    for sides in ([2.0, 3.0, 4.0, 9.0 - away], [0.7, 0.1, 0.1, 0.9 - away]):
+        assert open_radius(sides) == pytest.approx(exact_radius(sides, 1), rel=4e-15)
+        radius, sweeps = conformal(sides, "open")
+        chords = 2.0 * radius * np.abs(np.sin(0.5 * np.array(sweeps)))
+        np.testing.assert_allclose(chords, sides, rtol=1e-14)
+        assert sum(sweeps) == pytest.approx(0.0, abs=1e-15)
+
+
+def test_half_turns_follow_the_other_links():
+    # where 180 degrees come out of a difference rounding must not choose their side
+    rng = np.random.default_rng(12)
+    for first in np.round(rng.uniform(0.0, 360.0, 500), 2).tolist():
+        for way in (1.0, -1.0):
+            degrees = [first, first + way * 20.0, first + way * 60.0, first + way * 180.0]
+            sweeps = sweeps_of(np.radians(degrees).tolist())
+            assert sum(sweeps) == pytest.approx(2.0 * np.pi * way, abs=1e-13)
 
 
 @pytest.mark.parametrize("branch", ["open", "crossed"])

@@ -10,10 +10,11 @@ from hypothesis import strategies as st
 
 from devcad.errors import GeometryError
 from devcad.geometry.taylor import Array
-from devcad.simulate.bars import crossed, natural
+from devcad.simulate.bars import crossed, natural, panel_areas
 from devcad.simulate.material import Material
 from devcad.simulate.model import build
 from devcad.simulate.modes import tangent
+from devcad.simulate.stiffnesses import crease_folding, panel_bending
 from devcad.simulate.topology import Sheet
 
 EXACT = 1e-12  # relative: sums of some hundred products
@@ -94,6 +95,21 @@ def test_the_exact_shear_diagonal_alone_is_exact_in_shear() -> None:
     strain = np.array([0.0, 0.0, 1.0])
     got = stored(Sheet(flat, quads), PAPER, strain, "exact-shear")
     assert got == pytest.approx(exact(1.6, PAPER, strain), rel=EXACT)
+
+
+def test_the_areas_of_a_crossed_panel_are_the_published_ones_below_zero_too() -> None:
+    """O31: 20 x 10, nu = 1/3, t = 0.5; a model of such panels is refused, the formula is not."""
+    got = panel_areas(np.array(20.0), np.array(10.0), Material(1.0, 1 / 3, 0.5))
+    assert np.array(got) == pytest.approx([-0.9375, 5.15625, 5.2407843222651325], rel=EXACT)
+
+
+def test_the_stiffness_of_creases_and_panels_is_the_published_one() -> None:
+    """O32: E = 4000, nu = 0.3, t = 0.1; L_F = 50, L* = 30, D_s = 40, sum(alpha) = pi / 2."""
+    assert PAPER.plate == pytest.approx(0.3663003663003663, rel=EXACT)
+    fold = crease_folding(np.array(50.0), np.array(30.0), PAPER)
+    assert fold == pytest.approx(0.6105006105006106, rel=EXACT)
+    bend = panel_bending(np.array(40.0), np.array(np.pi / 2), PAPER)
+    assert bend == pytest.approx(0.9176342194415615, rel=EXACT)
 
 
 def test_long_crossed_panels_are_refused_and_not_clipped() -> None:

@@ -84,7 +84,7 @@ def test_a_mountain_is_a_valley_seen_from_behind() -> None:
     assert mirrored == pytest.approx(valley.steps[-1].positions, abs=1e-7)
 
 
-@pytest.mark.parametrize("length_scale", [None, 1e-3, 1e6])
+@pytest.mark.parametrize("length_scale", [None, 1e-300, 1e-3, 1e6])
 @pytest.mark.parametrize("degrees", [30.0, -170.0])
 def test_a_straight_crease_folds_by_its_rest_angle_stiff_or_soft(
     length_scale: float | None, degrees: float

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from shapely import LineString
 
-from devcad.geometry.linkage import ROLES, Link, Linkage, branch_of, shorter_way
+from devcad.geometry.linkage import ROLES, Link, Linkage, branch_of, sweeps_of
 from devcad.simulate.bodies import Arc, Poses
 from devcad.simulate.clash import crossing
 from devcad.simulate.drives import FourBarDrive, RingDrive
@@ -25,9 +25,8 @@ def linkage(degrees: list[float], *, abreast: bool = False) -> Linkage:
     joints = tuple(math.radians(angle) for angle in degrees)
     n = len(joints)
     links = []
-    for k in range(n):
+    for k, sweep in enumerate(sweeps_of(joints)):
         band = ((0.0, 5.0),) if abreast else ((6.0 * k, 6.0 * k + 5.0),)
-        sweep = shorter_way(joints[(k + 1) % n] - joints[k])
         name = ROLES[k] if n == 4 else str(k + 1)
         links.append(Link(name, k, (k + 1) % n, sweep, (0.0, 0.0), band, RADIUS))
     return Linkage(RADIUS, joints, tuple(links), branch_of(joints), "hole")
@@ -231,6 +230,35 @@ def test_a_ring_of_two_lengths_keeps_them() -> None:
         np.testing.assert_allclose(
             np.roll(joints, -2, axis=1) / joints, joints[:, 2:3] / joints[:, :1] + 0 * joints
         )
+
+
+def test_the_shorter_link_of_a_pair_goes_all_the_way_round() -> None:
+    """The base of the triangle P0 P1 P2 is never shorter than b - a > 0: nothing stops it."""
+    degrees = [0.0, 25.0, 90.0, 115.0, 180.0, 205.0, 270.0, 295.0]
+    found = motion(linkage(degrees))
+    assert isinstance(found.drive, RingDrive)
+    assert found.drive.ends == ("whole turn", "whole turn")
+    assert found.drive.reach == (-2.0 * math.pi, 2.0 * math.pi)
+    seen = found.drive.poses(np.linspace(0.0, 2.0 * math.pi, 721))
+    np.testing.assert_allclose(seen.joints[-1], seen.joints[0], atol=1e-12)
+    a, b = 2.0 * RADIUS * np.sin(np.radians([12.5, 32.5]))
+    base = np.abs(seen.joints[:, 2] - seen.joints[:, 0])
+    assert (base.min(), base.max()) == pytest.approx((b - a, a + b), rel=1e-4)
+    assert np.abs(np.diff(seen.joints, axis=0)).max() < 0.02 * RADIUS  # and goes on evenly
+
+
+def test_the_longer_link_of_a_pair_stops_where_the_other_is_square_to_the_base() -> None:
+    degrees = [0.0, 65.0, 90.0, 155.0, 180.0, 245.0, 270.0, 335.0]
+    for order in (degrees, [-angle for angle in degrees]):
+        found = motion(linkage(order))
+        assert isinstance(found.drive, RingDrive)
+        assert found.drive.ends == ("toggle", "toggle")
+        for x in found.drive.reach:
+            (joints,) = found.drive.poses(np.array([x])).joints
+            other, base = joints[2] - joints[1], joints[2] - joints[0]
+            assert abs((other * base.conjugate()).real) < 1e-6 * abs(other * base)
+            beyond = found.drive.poses(np.array([x + math.copysign(1e-6, x)]))
+            assert np.isnan(beyond.joints[:, :2]).all()
 
 
 @pytest.mark.parametrize(

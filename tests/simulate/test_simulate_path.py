@@ -175,6 +175,7 @@ def test_no_state_is_returned_that_is_not_in_balance(monkeypatch: pytest.MonkeyP
         fold(model, (Stage(1, rest=model.rest(2.5)),))
     assert float(caught.value.value or 0) > float(caught.value.limit or 0)
     assert "steps" in caught.value.remedy
+    assert (caught.value.code, caught.value.check) == (3, "equilibrium")
 
 
 def test_cells_that_turn_over_and_creases_off_the_edges_are_told() -> None:

@@ -22,7 +22,6 @@ STEEL = Material(youngs=210e3, poisson=1e-9, thickness=0.5)  # no Poisson effect
 DENSITY = 7.85e-3  # g/mm3
 CLAMPED = Support(Where("start", None, "supports[0]"), ("x", "y", "z"), clamp=True)
 CELLS, LONG, WIDE = 24, 120.0, 20.0
-FREE = LONG * (1.0 - 1.0 / CELLS)  # the clamp grips the first row of cells
 BENDING = STEEL.youngs * WIDE * STEEL.thickness**3 / 12.0  # E I
 
 
@@ -47,11 +46,11 @@ def pulled(
 def test_a_clamped_strip_is_as_stiff_as_a_beam_and_sounds_like_one() -> None:
     outcome = pulled((0.0, 0.0, 0.01))
     (load,) = outcome.loads
-    stiff = 3.0 * BENDING / FREE**3
+    stiff = 3.0 * BENDING / LONG**3  # free from the clamped border on
     assert load.stiffness[0] == pytest.approx(stiff, rel=0.01)  # the issue's limit
     assert load.displacement == pytest.approx(0.01 / stiff, rel=0.01)
     inertia = DENSITY * 1e-6 * WIDE * STEEL.thickness  # tonnes/mm
-    first = 1.87510407**2 / (2.0 * math.pi * FREE**2) * math.sqrt(BENDING / inertia)
+    first = 1.87510407**2 / (2.0 * math.pi * LONG**2) * math.sqrt(BENDING / inertia)
     assert outcome.frequencies[0] == pytest.approx(first, rel=0.01)
 
 
@@ -66,8 +65,63 @@ def test_what_supports_hold_is_what_loads_pull() -> None:
     assert held == pytest.approx(np.negative(force), abs=1e-6)
     weights = np.array([0.25, 0.5, 0.25])  # corners bear half of what the middle bears
     end = weights @ last.positions[outcome.net.edges["end"]]
-    turned = np.cross(last.positions, last.reactions).sum(axis=0) + np.cross(end, force)
-    assert turned == pytest.approx(0.0, abs=1e-5 * LONG)
+    turned = np.cross(last.positions, last.reactions).sum(axis=0) + last.moments.sum(axis=0)
+    assert turned + np.cross(end, force) == pytest.approx(0.0, abs=1e-5 * LONG)
+    assert outcome.turning[0] == pytest.approx(turned, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("name", "nu"), [("exact", 0.0), ("exact", -0.3), ("exact-shear", 0.3), ("kept-rulings", 0.45)]
+)
+def test_a_clamped_plate_bends_to_a_cylinder_from_its_border_on(name: str, nu: float) -> None:
+    """3 D W / L^3 of plate theory, the whole sheet's length being L."""
+    sheet = Material(youngs=2000.0, poisson=nu, thickness=0.4)
+    how = Simulation(
+        cells=24,
+        across=4,
+        load_steps=1,
+        modes=0,
+        coefficients=name,
+        supports=(CLAMPED,),
+        loads=(Load(Where("end", None, "loads[0]"), (0.0, 0.0, 1e-6)),),
+    )
+    outcome = simulate(net_of(strip(), how), how, sheet, formed=True)
+    plate = 3.0 * sheet.plate * WIDE / LONG**3
+    assert outcome.loads[0].stiffness[0] == pytest.approx(plate, rel=0.001)  # h^2 / (2 L^2)
+
+
+def test_a_border_clamped_in_one_direction_slides_in_its_plane() -> None:
+    """Only what stands square to the plate is held, and the border does not turn: bending as of a
+    clamp, and a pull along the plate goes to the one node that is held there."""
+    slide = Support(Where("start", None, "supports[0]"), ("z",), clamp=True)
+    pin = Support(Where(None, (0.0, 0.0), "supports[1]"), ("x", "y"), clamp=False)
+    other = Support(Where(None, (WIDE, 0.0), "supports[2]"), ("y",), clamp=False)
+    how = Simulation(
+        cells=CELLS,
+        across=2,
+        load_steps=1,
+        modes=0,
+        supports=(slide, pin, other),
+        loads=(Load(Where("end", None, "loads[0]"), (0.0, 1e-3, 1e-3)),),
+    )
+    outcome = simulate(net_of(strip(), how), how, STEEL, formed=True)
+    rise = outcome.states[-1].positions[outcome.net.edges["end"], 2].mean()
+    assert rise == pytest.approx(1e-3 * LONG**3 / (3.0 * BENDING), rel=0.01)
+    assert outcome.reactions[0] == pytest.approx([0.0, 0.0, -1e-3], abs=1e-8)
+    assert outcome.reactions[1][1] + outcome.reactions[2][1] == pytest.approx(-1e-3, rel=1e-6)
+    assert outcome.turning[0][0] == pytest.approx(-1e-3 * LONG, rel=1e-3)  # the clamp's moment
+
+
+def test_a_sheet_has_no_more_modes_than_it_can_move() -> None:
+    every = tuple(
+        Support(Where(edge, None, f"supports[{k}]"), ("x", "y", "z"), clamp=False)
+        for k, edge in enumerate(("start", "end", "base", "top"))
+    )
+    how = Simulation(cells=2, across=2, supports=every)
+    outcome = simulate(net_of(strip(), how), how, STEEL, formed=True)
+    assert len(outcome.modes) == 3  # of the one node inside
+    how = Simulation(cells=2, across=1, supports=every)
+    assert simulate(net_of(strip(), how), how, STEEL, formed=True).modes == ()
 
 
 def test_a_rolled_panel_keeps_its_shape_without_loads() -> None:

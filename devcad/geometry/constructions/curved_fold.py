@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
 from devcad.errors import GeometryError, JobError
 from devcad.geometry import taylor
@@ -50,6 +50,10 @@ CLEAR = 0.1
 TOUCHES = -1e-9
 """The same at an outer edge, which rulings may touch: the check ``regular`` decides."""
 
+MOST = 12
+"""Further creases on either side: what a crease costs grows with the square of those before it."""
+Creases = Annotated[tuple[ScalarExpression, ...], Field(max_length=MOST)]
+
 
 class CurvedFold(Surface):
     """One sheet folded along curved creases, the first drawn in the flat or given in space.
@@ -79,8 +83,8 @@ class CurvedFold(Surface):
     torsion: ScalarExpression | None = None
     ruling: ScalarExpression | None = None
     extent: Extent
-    left_creases: tuple[ScalarExpression, ...] = ()
-    right_creases: tuple[ScalarExpression, ...] = ()
+    left_creases: Creases = ()
+    right_creases: Creases = ()
     groove: NonNegative | None = None
     cut: ConstantExpression | None = None
 

@@ -285,7 +285,9 @@ def _require_one_sheet(spans: list[Span], widths: tuple[float, ...]) -> None:
 def _link(linkage: Linkage, k: int, hinge: Hinge) -> BuiltPanel:
     """The panel of link k: its arc with an ear beyond both joints, and what its hinges cut."""
     link = linkage.links[k]
-    ends = (linkage.joints[k], linkage.joints[k] + link.sweep)
+    # from -pi on: short links at large radii keep their digits beside 0
+    start = math.remainder(linkage.joints[k] + 0.5 * link.sweep, TURN) - 0.5 * link.sweep
+    ends = (start, start + link.sweep)
     low, high = min(ends) - link.overhang[0], max(ends) + link.overhang[1]
     band = link.band[0]
     patch = _patch(linkage.radius, (low, high), band)

@@ -11,7 +11,7 @@ import numpy as np
 from devcad.errors import JobError
 from devcad.geometry.constructions.base import Hole
 from devcad.geometry.drawing import Drawing
-from devcad.geometry.linkage import Link
+from devcad.geometry.linkage import TURN, Link
 from devcad.geometry.staggering import fingers
 from devcad.geometry.taylor import Array
 
@@ -23,6 +23,8 @@ NARROWEST = 2.0 * TO_EDGE + 2.0
 """Of a link with two holes at each joint, in diameters: as much between them too."""
 APART = 2.0
 """Between the joints of a link, in diameters of its holes."""
+SHORTEST = 5e-4
+"""Of the longest link, along the circle: holes to match are lost in any tolerance of the part."""
 BEYOND = 0.5
 """How far a notch runs beyond the edge that it crosses, as a share of the reach."""
 
@@ -42,8 +44,14 @@ class Hinge:
 
     def require_room(self, radius: float, links: Sequence[Link]) -> None:
         """JobError where a link is too small for its hinges."""
+        longest = radius * max(abs(link.sweep) for link in links)
         for k, link in enumerate(links):
             width, arc = link.band[0][1] - link.band[0][0], radius * abs(link.sweep)
+            if self.kind != "living":
+                what = f"link {k + 1} is too short for hinges beside the longest"
+                _least(arc, SHORTEST * longest, "links", what)
+                most = 0.5 * (radius * TURN - arc - self.clearance)
+                _most(self.reach, most, "reach", f"link {k + 1} goes round onto itself")
             if self.kind == "hole":
                 _least(self.reach, self.pin, "reach", "the ears end beside the holes")
                 _least(width, NARROWEST * self.pin, "widths", f"link {k + 1} is too narrow")
@@ -73,6 +81,17 @@ def _least(value: float, limit: float, key: str, what: str) -> None:
             value=value,
             limit=limit,
             remedy="give smaller hinges or larger links",
+        )
+
+
+def _most(value: float, limit: float, key: str, what: str) -> None:
+    """JobError where a length is above its limit."""
+    if value > limit:
+        raise JobError(
+            f"{key}: {what}: {value:.6g}, at most {limit:.6g}",
+            value=value,
+            limit=limit,
+            remedy="give smaller hinges or a larger radius",
         )
 
 
