@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from devcad.features import Features
     from devcad.finishing import Edges
     from devcad.geometry.constructions.base import BuiltPanel
+    from devcad.geometry.linkage import Linkage
     from devcad.geometry.patch import Patch
     from devcad.shop.limits import Bounds
 
@@ -70,14 +71,20 @@ def plan(
 
 def _moves(job: Job) -> bool:
     """Whether the job has a mechanism whose motion is known."""
-    mechanisms = [panel.surface for panel in _mechanisms(job)]
+    mechanisms = _mechanisms(job)
     if not mechanisms:
         return False
     from devcad.simulate.motion import motion
 
     with suppress(DevcadError):  # what is wrong with it is told when it is built
-        return any(motion(surface.linkage()).drive is not None for surface in mechanisms)
+        return any(motion(_linkage(panel)).drive is not None for panel in mechanisms)
     return False
+
+
+def _linkage(panel: JobPanel) -> Linkage:
+    """The links of a panel that is a mechanism, in the job's unit."""
+    found: Linkage = getattr(panel.surface, "linkage")()  # noqa: B009
+    return found
 
 
 def _mechanisms(job: Job) -> list[JobPanel]:
@@ -139,7 +146,7 @@ def _linked(
 
     linkages = [
         standing(
-            getattr(panel.surface, "linkage")().scaled(job.mm_per_unit),  # noqa: B009
+            _linkage(panel).scaled(job.mm_per_unit),
             [spec.name for own, spec in made if own is panel],
             panel.place,
             job.thickness,
