@@ -48,12 +48,12 @@ def test_each_fault_fails_its_part_alone_with_its_class(tmp_path: Path) -> None:
         "z",
     ]
     orders, out = jobs(tmp_path, *names), tmp_path / "out"
-    batch = quick(orders, out, walls=Walls(seconds=1.5, memory=200 * faulty.MEGABYTE))
+    batch = quick(orders, out, walls=Walls(seconds=4.0, memory=200 * faulty.MEGABYTE))
     assert causes(batch) == {
         "a": ("", 0, 1),
         "segfault": ("crashed: signal 11", 70, 2),
         "once": ("", 0, 2),
-        "hang": ("timed out after 1.5 s", 4, 2),
+        "hang": ("timed out after 4 s", 4, 2),
         "eat": ("out of memory", 4, 2),
         "swell": ("out of memory", 4, 2),
         "abort": ("out of memory", 4, 2),
@@ -71,7 +71,7 @@ def test_each_fault_fails_its_part_alone_with_its_class(tmp_path: Path) -> None:
     assert {path.name for path in out.iterdir() if path.is_dir()} == {*done, ".batch", ".failed"}
     assert batch.code == 70
     known = len(made(out))
-    quick(orders, out, walls=Walls(seconds=1.5, memory=200 * faulty.MEGABYTE))
+    quick(orders, out, walls=Walls(seconds=4.0, memory=200 * faulty.MEGABYTE))
     assert "refused" not in made(out)[known:]  # it would be refused again
 
 
