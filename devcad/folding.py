@@ -22,6 +22,21 @@ if TYPE_CHECKING:
     from devcad.simulate.sheet import Shapes
 
 Progress = Callable[[str], None]
+THIN = 1e-3
+"""Of the pattern's longer side: how thick a sheet is of which the job does not say it."""
+NEEDED = {
+    "youngs": (
+        "Young's modulus",
+        'give material = "..." in the job (devcad list materials), or youngs in N/mm2 in '
+        "[simulate]",
+    ),
+    "poisson": ("Poisson's ratio", "give poisson in [simulate], such as 0.3"),
+    "thickness": (
+        "thickness",
+        "give thickness in the job, or in [simulate] where the part is to stay a surface",
+    ),
+}
+"""What a sheet is simulated with: its name, and what helps where it is missing."""
 
 
 def fold(
@@ -78,7 +93,6 @@ def fold_job(
 
     how = job.simulate or Simulation()
     stuff = material(job.material) if job.material else None
-    sheet = _sheet(job, how, stuff)
     part = build(job, pipeline=pipeline, allow=allow, progress=progress)
     panel = _panel(part, job, how)
     if not panel.folds and not how.supports:
@@ -89,6 +103,7 @@ def fold_job(
             limit="a curved fold, or supports and loads",
             remedy="give supports and loads in [simulate], or take kind = curved-fold",
         )
+    sheet, nominal = _sheet(job, how, stuff, panel)
     progress(f"{job.name}: simulation")
     net = net_of(panel, how)
     shapes = _shapes(panel, net, job.bend) if panel.folds else None
@@ -102,7 +117,7 @@ def fold_job(
         listener=lambda reached: progress(f"{job.name}: {reached}"),
     )
     progress(f"{job.name}: files")
-    notes = _notes(part, panel, stuff)
+    notes = [*nominal, *_notes(part, panel, stuff)]
     if panel.folds and shapes is None:
         notes.append(
             "between flat and built no exact shape with fixed rulings exists: steps in "
@@ -124,8 +139,12 @@ def _shapes(panel: Panel, net: Net, bend: float) -> Shapes | None:
     return lambda share: net.on(standing(blanks, hangings, share * bend))
 
 
-def _sheet(job: Job, how: Simulation, stuff: Stuff | None) -> Material:
-    """What the simulated sheet is made of: the keys of [simulate], then the job's material.
+def _sheet(
+    job: Job, how: Simulation, stuff: Stuff | None, panel: Panel
+) -> tuple[Material, tuple[str, ...]]:
+    """What the simulated sheet is made of: the keys of [simulate], then the job's material; and a
+    note where neither says it and nothing but its creases moves the sheet, whose shape hardly
+    asks: then it is a nominal one.
 
     Raises:
         JobError: a number that neither gives.
@@ -137,27 +156,16 @@ def _sheet(job: Job, how: Simulation, stuff: Stuff | None) -> Material:
         "poisson": stuff.poisson if how.poisson is None and stuff else how.poisson,
         "thickness": how.thickness or job.thickness or None,
     }
-    remedies = {
-        "youngs": 'give material = "..." in the job (devcad list materials), or youngs in N/mm2 '
-        "in [simulate]",
-        "poisson": "give poisson in [simulate], such as 0.3",
-        "thickness": "give thickness in the job, or in [simulate] where the part is to stay a "
-        "surface",
-    }
-    names = {
-        "youngs": "Young's modulus",
-        "poisson": "Poisson's ratio",
-        "thickness": "thickness",
-    }
-    for key, value in given.items():
-        if value is None:
-            raise JobError(
-                f"the simulation has no {names[key]} of the sheet",
-                place=f"{job.path} > simulate.{key}",
-                value="",
-                limit="above 0",
-                remedy=remedies[key],
-            )
+    missing = [key for key, value in given.items() if value is None]
+    if missing and (how.loaded or not panel.folds):
+        name, remedy = NEEDED[missing[0]]
+        raise JobError(
+            f"the simulation has no {name} of the sheet",
+            place=f"{job.path} > simulate.{missing[0]}",
+            value="",
+            limit="above 0",
+            remedy=remedy,
+        )
     if how.weight is not None and stuff is None:
         raise JobError(
             "the sheet's weight is not known without a material",
@@ -166,7 +174,14 @@ def _sheet(job: Job, how: Simulation, stuff: Stuff | None) -> Material:
             limit="a material of the library",
             remedy='give material = "..." in the job; devcad list materials names them',
         )
-    return Material(**{key: float(value) for key, value in given.items() if value is not None})
+    left, below, right, above = panel.pattern.bbox
+    thin = THIN * max(right - left, above - below)
+    nominal = {"youngs": 1.0, "poisson": 0.3, "thickness": thin}
+    taken = {key: nominal[key] for key in missing}
+    numbers = {key: float(value) for key, value in given.items() if value is not None}
+    told = ", ".join(f"{key} = {value:.4g}" for key, value in taken.items())
+    notes = (f"nominal, for the job does not say: {told}; forces and energies follow it",)
+    return Material(**numbers, **taken), notes if taken else ()
 
 
 def _panel(part: Part, job: Job, how: Simulation) -> Panel:

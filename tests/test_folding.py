@@ -11,6 +11,8 @@ import numpy as np
 import pytest
 
 from devcad.cli import run
+from devcad.folding import fold_job
+from devcad.job.load import load
 
 STRIP = """\
 name = "strip"
@@ -71,6 +73,20 @@ def folded(folder: Path, *options: str, **keys: str) -> dict[str, object]:
     return told
 
 
+def crease_radius(table: Path) -> float:
+    """That of the circle nearest to the crease's nodes at the last step."""
+    nodes = rows(table)
+    count = sum(row["step"] == nodes[0]["step"] for row in nodes)
+    flat = np.array([[float(row[f"pattern_{axis}"]) for axis in "xy"] for row in nodes[:count]])
+    crease = np.abs(np.linalg.norm(flat - [-100.0, 0.0], axis=1) - 100.0) < 1e-6
+    assert crease.sum() == 17
+    last = np.array([[float(row[axis]) for axis in "xyz"] for row in nodes[-count:]])[crease]
+    away = last - last.mean(axis=0)
+    plane = away @ np.linalg.svd(away)[2][:2].T
+    a = np.linalg.lstsq(np.c_[2 * plane, np.ones(17)], (plane**2).sum(axis=1), rcond=None)[0]
+    return float(np.sqrt(a[2] + a[0] ** 2 + a[1] ** 2))
+
+
 @pytest.mark.slow
 def test_a_folded_sheet_is_written_step_by_step_with_the_same_bytes_each_time(
     tmp_path: Path, capsys: Captured
@@ -88,15 +104,7 @@ def test_a_folded_sheet_is_written_step_by_step_with_the_same_bytes_each_time(
     energies = [float(row["energy_N_mm"]) for row in steps]
     assert energies == sorted(energies)
     assert all(float(row["rms_mm"]) < 0.5 for row in steps)  # the exact shape is known throughout
-    nodes = rows(folder / "annulus-fold-nodes.csv")
-    flat = np.array([[float(row[f"pattern_{axis}"]) for axis in "xy"] for row in nodes[:51]])
-    crease = np.abs(np.linalg.norm(flat - [-100.0, 0.0], axis=1) - 100.0) < 1e-6
-    assert crease.sum() == 17
-    last = np.array([[float(row[axis]) for axis in "xyz"] for row in nodes[-51:]])[crease]
-    away = last - last.mean(axis=0)
-    plane = away @ np.linalg.svd(away)[2][:2].T
-    a = np.linalg.lstsq(np.c_[2 * plane, np.ones(17)], (plane**2).sum(axis=1), rcond=None)[0]
-    radius = np.sqrt(a[2] + a[0] ** 2 + a[1] ** 2)
+    radius = crease_radius(folder / "annulus-fold-nodes.csv")
     assert radius == pytest.approx(100.0 * np.sqrt(0.75), rel=1e-3)  # the issue's limit, 16 cells
     before = {path.name: path.read_bytes() for path in folder.iterdir()}
     folded(tmp_path)
@@ -138,6 +146,18 @@ def test_a_loaded_panel_tells_reactions_stiffness_and_modes(
     moment = told["reactions"][0]["moment"]  # about the origin: what pulls the end, and the weight
     assert moment[0] == pytest.approx(weight * 50.0 - 0.01 * 100.0, rel=1e-3)
     assert not any("strains" in note for note in told["notes"])
+
+
+def test_a_crease_folds_without_a_word_on_the_material(tmp_path: Path) -> None:
+    """Its shape hardly asks for one."""
+    job = tmp_path / "job.toml"
+    silent = FOLDED.replace("thickness = 0.3\n", "").replace("youngs = 3000\npoisson = 0.3\n", "")
+    job.write_text(silent.format(top="", simulate=""))
+    told = fold_job(load(job), tmp_path / "out")
+    assert told["notes"][0].startswith("nominal")
+    assert told["material"]["youngs"] == 1.0
+    radius = crease_radius(tmp_path / "out/annulus/annulus-fold-nodes.csv")
+    assert radius == pytest.approx(100.0 * np.sqrt(0.75), rel=1e-3)
 
 
 def test_strains_that_no_sheet_bears_are_told(tmp_path: Path, capsys: Captured) -> None:
