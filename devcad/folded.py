@@ -56,6 +56,7 @@ MIDDLE = (
     "the pattern is the development of the middle of the sheet: any other neutral fibre would make "
     "the crease longer on one side than on the other"
 )
+THIN = "without thickness there is no groove: both sides of a crease share it"
 ROOMY = 1.1
 """A groove is so much wider than what lets two thick flanks touch, unless its width is given."""
 
@@ -85,7 +86,7 @@ def folded(spec: PanelSpec, how: Making) -> tuple[Panel, Blank, list[Check]]:
         GeometryError, CheckFailed: it cannot be made as it is described.
     """
     _refuse(spec, how)
-    words = () if how.fibre is None else (MIDDLE,)
+    words = (*((MIDDLE,) if how.fibre else ()), *((THIN,) if _grooveless(spec, how) else ()))
     how = lenient(spec, replace(how, fibre=None))
     specs = [
         replace(spec, patches=patches, flanks=(), figures={}, notes=(), features=Features())
@@ -118,6 +119,11 @@ def folded(spec: PanelSpec, how: Making) -> tuple[Panel, Blank, list[Check]]:
     return replace(panel, facts=facts), sheet.blanks[0], checks
 
 
+def _grooveless(spec: PanelSpec, how: Making) -> bool:
+    """Whether a groove is asked for that a sheet without thickness does not have."""
+    return spec.groove is not None and not how.thickness
+
+
 def _refuse(spec: PanelSpec, how: Making) -> None:
     """Raise a JobError for what is not done with curved creases."""
     asked = {
@@ -125,12 +131,6 @@ def _refuse(spec: PanelSpec, how: Making) -> None:
         'reference = "front" or "back"': bool(how.thickness) and how.reference != "middle",
         "a gap": spec.gap > 0.0,
     }
-    if spec.groove is not None and not how.thickness:
-        raise JobError(
-            "groove: a sheet without thickness needs none",
-            value=spec.groove,
-            remedy="give the job a thickness, or remove the key groove",
-        )
     for what, given in asked.items():
         if given:
             raise JobError(
