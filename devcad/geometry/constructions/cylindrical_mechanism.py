@@ -93,13 +93,14 @@ Several = Field(min_length=FEWEST, max_length=MOST)
 
 
 class CylindricalMechanism(Surface):
-    """Links that lie in the cylinder of ``radius`` about z, hinged along its rulings at the angles
-    ``joints``; or ``links`` of given lengths, whose joints come to lie on a circle.
+    """Links that lie in one cylinder about z and turn about its rulings.
 
-    Link k reaches from joint k to joint k + 1, the shorter way round, the last one (the ground)
-    back to joint 0. c0 = the circle in z = 0, t the angle from +x, e = +z: the front is the inside.
-    All joint axes are at ``radius``; a link in layer j lies j thicknesses further out. Links are
-    kept apart along z, in bands one above the other; those that cannot touch share one.
+    They are hinged at the angles ``joints`` on the cylinder of ``radius``, or have the lengths
+    ``links`` and lie on the cylinder on which their joints come to be. Link k reaches from joint k
+    to joint k + 1, the shorter way round, the last one (the ground) back to joint 0. c0 = the
+    circle in z = 0, t the angle from +x, e = +z: the front is the inside. All joint axes are at
+    ``radius``; a link in layer j lies j thicknesses further out. Links are kept apart along z, in
+    bands one above the other; those that cannot touch share one.
     Source: geometry.md, section 7.
     """
 
