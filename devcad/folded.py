@@ -18,17 +18,15 @@ from devcad.facts import sheet_facts
 from devcad.features import Features
 from devcad.flatten.blank import Blank, lay_flat
 from devcad.flatten.flanks import Hanging, apart, beside, one_sheet
-from devcad.flatten.foldings import creases, largest_sine
+from devcad.flatten.foldings import creases, groove_width
 from devcad.flatten.outline import sheet_area
 from devcad.flatten.scores import fine, told
-from devcad.flatten.sharing import shared_out
+from devcad.flatten.sharing import refuse_in_groove, shared_out
 from devcad.geometry.chain import JOINED, Chain
 from devcad.geometry.classify import classify, patch_box
 from devcad.geometry.creasing import Crease
-from devcad.geometry.cuts import Cut
-from devcad.geometry.patch import Patch
-from devcad.geometry.rulings import TURN, place, strip_deviation
-from devcad.geometry.taylor import Array, rows_dot
+from devcad.geometry.rulings import place_together
+from devcad.geometry.taylor import Array
 from devcad.making import (
     ATTEMPTS,
     Making,
@@ -48,8 +46,6 @@ from devcad.proofs import overlap, prove_surface, volume_error
 
 SCORE_LIMIT, SCORE_SHARE = 1e-10, 1e-12
 """mm, and share of the sheet's size: how far apart both sides may develop their crease."""
-HALVINGS = 40
-"""Rounds of halving strips that are too coarse on another flank, at most."""
 WHOLE = 1e-9
 """An edge of which less than this share is missing is whole."""
 MIDDLE = (
@@ -57,8 +53,6 @@ MIDDLE = (
     "the crease longer on one side than on the other"
 )
 THIN = "without thickness there is no groove: both sides of a crease share it"
-ROOMY = 1.1
-"""A groove is so much wider than what lets two thick flanks touch, unless its width is given."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +88,8 @@ def folded(spec: PanelSpec, how: Making) -> tuple[Panel, Blank, list[Check]]:
     ]
     sheet = _laid_out(spec, specs, replace(how, thickness=0.0, bend=1.0))
     chains, notes = _standing(sheet, how.bend)
-    groove = _groove(sheet, spec.groove, how.thickness)
+    along = [crease for hanging in sheet.hangings for crease in sheet.creases(hanging)]
+    groove = groove_width(along, spec.groove, how.thickness)
     bodies = _bodies(sheet, chains, groove) if how.thickness else chains
     rulings = _rulings(bodies, how)
     flanks: list[Panel] = []
@@ -209,30 +204,6 @@ def _bodies(sheet: _Sheet, chains: Sequence[Chain], width: float) -> list[Chain]
     return bodies
 
 
-def _groove(sheet: _Sheet, given: float | None, thickness: float) -> float:
-    """The width of the grooves in mm: the least at which both sides of every crease stand free, and
-    a tenth more, or what is given.
-
-    Raises:
-        GeometryError: what is given is less than that.
-    """
-    sines = [
-        largest_sine(crease) for hanging in sheet.hangings for crease in sheet.creases(hanging)
-    ]
-    sine = max(sines)
-    least = thickness * sine / float(np.sqrt(1.0 - sine**2))
-    if given is None:
-        return ROOMY * least
-    if given < least:
-        raise GeometryError(
-            f"groove: {given:.6g} mm lets both sides of the crease stand in one another",
-            value=given,
-            limit=least,
-            remedy=f"make it {least:.4g} mm wide or more (thickness x tan(half the fold angle))",
-        )
-    return given
-
-
 @contextmanager
 def _told_of_creases(number: int, hangings: Sequence[Hanging]) -> Iterator[None]:
     """What leaves a flank over an edge that is a crease, told so."""
@@ -265,28 +236,11 @@ def _require_whole(flanks: Sequence[Panel], hangings: Sequence[Hanging]) -> None
                 )
 
 
-def _require_beside(cuts: Sequence[Cut], whole: Chain, body: Chain, groove: float) -> None:
-    """Raise a GeometryError where a cutout reaches into the groove of a crease."""
-    for cut in cuts:
-        for track in cut.tracks:
-            t, v = track.series(np.linspace(track.u[0], track.u[-1], 65))[:, :2].T
-            sheet, left = (chain.patches[track.patch].jet(t, 0) for chain in (whole, body))
-            low = (left.v_from > sheet.v_from)[0] & (v < left.v_from[0])
-            high = (left.v_to < sheet.v_to)[0] & (v > left.v_to[0])
-            if (low | high).any():
-                raise GeometryError(
-                    f"cutout-crosses-edge: a cutout reaches into the groove of {groove:.4g} mm "
-                    f"along a curved crease, at t = {t[np.argmax(low | high)]:.6g}",
-                    value=groove,
-                    remedy="move it away from the crease, or give the sheet no thickness",
-                )
-
-
 def _thickened(
     panel: Panel, body: Chain, how: Making, groove: float, rulings: tuple[Array, ...]
 ) -> tuple[Panel, list[Check]]:
     """A flank as the solid that the grooves leave of it, and what that proves."""
-    _require_beside(panel.cuts, panel.chain, body, groove)
+    refuse_in_groove(panel.cuts, panel.chain, body, groove)
     from devcad.geometry.thickness import refuse_layers_apart, refuse_thick_apex
 
     shapes = tuple(classify(patch) for patch in body.patches)
@@ -318,7 +272,7 @@ def _rulings(chains: Sequence[Chain], how: Making) -> tuple[Array, ...]:
     aim = aim_of(chains, how)
     for _ in range(ATTEMPTS):
         rulings = tuple(
-            _shared(patches, how.layers, aim)
+            place_together(patches, how.layers, aim)
             for patches in zip(*(chain.patches for chain in chains), strict=True)
         )
         excess = 0.0
@@ -335,24 +289,6 @@ def _rulings(chains: Sequence[Chain], how: Making) -> tuple[Array, ...]:
 def _nowhere(_: int, t: Array, _v: Array) -> Array:
     """No place in any pattern: while rulings are looked for nobody asks."""
     return np.zeros((len(t), 2))
-
-
-def _shared(patches: Sequence[Patch], layers: tuple[float, ...], aim: float) -> Array:
-    """Rulings of patches that share their parameter, within ``aim`` on all of them."""
-    t = max((place(patch, layers, aim).t for patch in patches), key=len)
-    for _ in range(HALVINGS):
-        coarse = np.zeros(len(t) - 1, dtype=bool)
-        for patch in patches:
-            coarse |= strip_deviation(patch, layers, t) > aim
-            frame = patch.frame(
-                np.concatenate([[np.nextafter(t[0], t[1])], t[1:-1], [np.nextafter(t[-1], t[-2])]])
-            )
-            for axis in (frame.n, frame.e):
-                coarse |= rows_dot(axis[:-1], axis[1:]) < np.cos(1.01 * TURN)
-        if not coarse.any():
-            break
-        t = np.sort(np.concatenate([t, 0.5 * (t[:-1] + t[1:])[coarse]]))
-    return t
 
 
 def _joined(spec: PanelSpec, sheet: _Sheet, flanks: Sequence[Panel], how: Making) -> Panel:

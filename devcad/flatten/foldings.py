@@ -20,6 +20,8 @@ from devcad.geometry.chain import Chain
 from devcad.geometry.creasing import Crease
 from devcad.geometry.patch import Frame
 
+ROOMY = 1.1
+"""A groove is so much wider than what lets two thick flanks touch, unless its width is given."""
 RIGID = 1e-9
 """Largest difference between what two creases make of c on the flank between them."""
 
@@ -116,3 +118,24 @@ def posed(
         assert start is not None
         chains.append(unevenly_bent(blanks[number], start, bends[number]))
     return chains
+
+
+def groove_width(along: Sequence[Crease], given: float | None, thickness: float) -> float:
+    """The width of the grooves in mm: the least at which both sides of every crease stand free, and
+    a tenth more, or what is given.
+
+    Raises:
+        GeometryError: what is given is less than that.
+    """
+    sine = max(largest_sine(crease) for crease in along)
+    least = thickness * sine / float(np.sqrt(1.0 - sine**2))
+    if given is None:
+        return ROOMY * least
+    if given < least:
+        raise GeometryError(
+            f"groove: {given:.6g} mm lets both sides of the crease stand in one another",
+            value=given,
+            limit=least,
+            remedy=f"make it {least:.4g} mm wide or more (thickness x tan(half the fold angle))",
+        )
+    return given

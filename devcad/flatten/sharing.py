@@ -13,6 +13,8 @@ from devcad.flatten.blank import Blank
 from devcad.flatten.border import border
 from devcad.flatten.flanks import Hanging, from_left
 from devcad.flatten.polygons import polygon, winding
+from devcad.geometry.chain import Chain
+from devcad.geometry.cuts import Cut
 from devcad.geometry.taylor import Array, rows_dot
 
 TRACED = 1e-4
@@ -102,3 +104,21 @@ def _width(blank: Blank, share: float) -> float:
     k = int(np.clip(np.searchsorted(before, far, side="right") - 1, 0, len(patches) - 1))
     jet = patches[k].jet([patches[k].domain[0] + far - before[k]], 0)
     return float((jet.v_to - jet.v_from)[0, 0])
+
+
+def refuse_in_groove(cuts: Sequence[Cut], whole: Chain, body: Chain, groove: float) -> None:
+    """Raise a GeometryError where a cutout of a flank, ``whole`` up to its creases, reaches into
+    the ``groove`` (mm) that leaves its ``body``."""
+    for cut in cuts:
+        for track in cut.tracks:
+            t, v = track.series(np.linspace(track.u[0], track.u[-1], 65))[:, :2].T
+            sheet, left = (chain.patches[track.patch].jet(t, 0) for chain in (whole, body))
+            low = (left.v_from > sheet.v_from)[0] & (v < left.v_from[0])
+            high = (left.v_to < sheet.v_to)[0] & (v > left.v_to[0])
+            if (low | high).any():
+                raise GeometryError(
+                    f"cutout-crosses-edge: a cutout reaches into the groove of {groove:.4g} mm "
+                    f"along a curved crease, at t = {t[np.argmax(low | high)]:.6g}",
+                    value=groove,
+                    remedy="move it away from the crease, or give the sheet no thickness",
+                )

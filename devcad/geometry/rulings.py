@@ -13,6 +13,7 @@ Source: algorithms.md, 3; sagitta of an arc of length s and curvature k: k s^2 /
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -37,6 +38,8 @@ INNER = np.arange(1, 12) / 12
 """Where a strip's deviation is measured, in shares of its parameter."""
 MANY, SPENT = 16, 0.86
 """A patch of this many strips is to use this share of its tolerance."""
+HALVINGS = 40
+"""Rounds of halving strips that are too coarse on another patch, at most."""
 GRID = 129
 """Density samples on one panel of the patch."""
 
@@ -79,6 +82,25 @@ def place(
             pieces[most] = segments[most].spent(len(pieces[most].t) - 1)
     t = np.concatenate([*(piece.t[:-1] for piece in pieces), ends[-1:]])
     return Placement(t, max(piece.deviation for piece in pieces))
+
+
+def place_together(patches: Sequence[Patch], layers: tuple[float, ...], tolerance: float) -> Array:
+    """Rulings (n,) of patches that share their parameter, within ``tolerance`` (mm) on all: those
+    of the patch that needs most of them, and more where another one does."""
+    t = max((place(patch, layers, tolerance).t for patch in patches), key=len)
+    for _ in range(HALVINGS):
+        coarse = np.zeros(len(t) - 1, dtype=bool)
+        for patch in patches:
+            coarse |= strip_deviation(patch, layers, t) > tolerance
+            frame = patch.frame(
+                np.concatenate([[np.nextafter(t[0], t[1])], t[1:-1], [np.nextafter(t[-1], t[-2])]])
+            )
+            for axis in (frame.n, frame.e):
+                coarse |= taylor.rows_dot(axis[:-1], axis[1:]) < np.cos(1.01 * TURN)
+        if not coarse.any():
+            break
+        t = np.sort(np.concatenate([t, 0.5 * (t[:-1] + t[1:])[coarse]]))
+    return t
 
 
 def strip_deviation(
