@@ -9,10 +9,11 @@ import numpy as np
 
 from devcad.flatten.blank import Blank, reaches_tips
 from devcad.flatten.development import develop_chain
-from devcad.flatten.fold import Bending, Folded, fold_chain
+from devcad.flatten.fold import Folded, fold_chain
 from devcad.flatten.neutral import Fibre
 from devcad.geometry import taylor
 from devcad.geometry.chain import Chain, link
+from devcad.geometry.creasing import Bending
 from devcad.geometry.patch import Frame, Patch, RulingJet
 from devcad.geometry.taylor import Array
 

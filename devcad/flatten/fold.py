@@ -11,7 +11,7 @@ Source: geometry.md, 14; Hairer, Lubich and Wanner, Geometric Numerical Integrat
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,11 +20,10 @@ from devcad.flatten.development import Development
 from devcad.geometry import chebyshev
 from devcad.geometry.chain import Chain
 from devcad.geometry.chebyshev import Piecewise
+from devcad.geometry.creasing import Bending
 from devcad.geometry.patch import Frame
 from devcad.geometry.taylor import Array
 
-Bending = Callable[[Array, int], Array]
-"""t (n,) and an order K -> the series (K + 1, n) of what c is multiplied by."""
 NODES = 17
 ROUNDS = 9
 """How often panels that are not resolved are halved."""

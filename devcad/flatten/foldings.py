@@ -15,13 +15,14 @@ from devcad.errors import GeometryError
 from devcad.flatten.bend import unevenly_bent
 from devcad.flatten.blank import Blank
 from devcad.flatten.flanks import Hanging
-from devcad.flatten.fold import Bending
 from devcad.geometry.chain import Chain
-from devcad.geometry.creasing import Crease
+from devcad.geometry.creasing import Bending, Crease
 from devcad.geometry.patch import Frame
 
 ROOMY = 1.1
 """A groove is so much wider than what lets two thick flanks touch, unless its width is given."""
+HALF = 0.5
+"""Where on the way it is seen whether a sheet folds with its rulings fixed."""
 RIGID = 1e-9
 """Largest difference between what two creases make of c on the flank between them."""
 
@@ -37,7 +38,8 @@ def family(
     middles: Sequence[Chain], hangings: Sequence[Hanging], bend: float
 ) -> tuple[list[list[Bending]], list[float]]:
     """What c of every flank is multiplied by, patch by patch, and sin(alpha) of every crease, when
-    the largest fold angle of the first crease is ``bend`` times what it is, 0 to 1.
+    the largest fold angle of the first crease is ``bend`` times what it is, 0 to 1. A flank that
+    lies between two creases takes the bending of the one that is nearer to the first.
 
     Raises:
         GeometryError: two creases of a flank ask for different bendings of it: there is no motion
@@ -73,7 +75,7 @@ def _require_rigid(
     middles: Sequence[Chain], hangings: Sequence[Hanging], bends: list[list[Bending]], bend: float
 ) -> None:
     if bend == 1.0:  # at the end all agree; what lies before tells
-        bends, _ = family(middles, hangings, 0.5)
+        family(middles, hangings, HALF)
         return
     for parent, child, _ in hangings:
         for patch, one, other in zip(
@@ -85,7 +87,7 @@ def _require_rigid(
             if off[k] > RIGID:
                 raise GeometryError(
                     f"the creases of one strip ask it to bend differently at t = {t[k]:.6g}, by "
-                    f"{off[k]:.3g} of its bending, when the sheet is folded half way",
+                    f"{off[k]:.3g} of its bending, when the sheet is folded to {bend:.3g}",
                     value=float(off[k]),
                     limit=RIGID,
                     remedy="use bend = 1, or give every crease one fold angle along its length",

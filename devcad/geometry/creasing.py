@@ -25,8 +25,8 @@ from devcad.geometry.patch import Frame, FrameJet, Patch, RulingJet
 from devcad.geometry.taylor import Array, rows_cross, rows_dot
 
 Side = Literal["base", "top"]
-SHARE = Callable[[Array, int], Array]
-"""t (n,) and an order K to a series (K + 1, n)."""
+Bending = Callable[[Array, int], Array]
+"""t (n,) and an order K -> the series (K + 1, n) of what c is multiplied by."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +50,7 @@ class Crease:
         apart = self.parent.frame_jet(t, order).n - self.child.frame_jet(t, order).n
         return taylor.dot(apart, apart)[: order + 1] / 4.0
 
-    def bending(self, mu: float) -> SHARE:
+    def bending(self, mu: float) -> Bending:
         """By what c is multiplied on both sides where sin(alpha) is ``mu`` times what it is."""
 
         def share(t: Array, order: int) -> Array:
@@ -111,12 +111,13 @@ def grooved(patch: Patch, side: Side, width: float) -> Patch:
         ruling = jet.ruling
         v = ruling.v_from if side == "base" else ruling.v_to
         x, y = _along(jet, v)
-        stay = RulingJet(*(series[: order + 1] for series in _fields(ruling)))
         size = taylor.sqrt(taylor.mul(x, x) + taylor.mul(y, y))
-        step = 0.5 * width * taylor.div(size, y)[: order + 1]
+        step = 0.5 * width * taylor.div(size, y)
+        k = order + 1
+        v_from, v_to = ruling.v_from[:k], ruling.v_to[:k]
         if side == "base":
-            return RulingJet(stay.c0, stay.e, stay.v_from + step, stay.v_to)
-        return RulingJet(stay.c0, stay.e, stay.v_from, stay.v_to - step)
+            return RulingJet(ruling.c0[:k], ruling.e[:k], v_from + step[:k], v_to)
+        return RulingJet(ruling.c0[:k], ruling.e[:k], v_from, v_to - step[:k])
 
     return Patch(field, patch.domain, patch.breaks, patch.causal)
 
@@ -126,7 +127,3 @@ def _along(jet: FrameJet, v: Array) -> tuple[Array, Array]:
     slope = taylor.derivative(v)
     k = len(slope)
     return jet.p[:k] + slope, (jet.q + taylor.mul(v, jet.a))[:k]
-
-
-def _fields(jet: RulingJet) -> tuple[Array, Array, Array, Array]:
-    return jet.c0, jet.e, jet.v_from, jet.v_to
